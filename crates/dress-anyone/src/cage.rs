@@ -1,0 +1,1 @@
+//! The control cage of each panel (paper §4.3): control points ζ carry the rest shape x̄ = x̄(ζ).

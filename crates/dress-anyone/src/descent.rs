@@ -1,0 +1,1 @@
+//! Levenberg–Marquardt over plain vectors; knows nothing of garments.

@@ -1,0 +1,67 @@
+//! A garment: pattern, sewing, fabric, and — once it has one — its drape.
+
+use crate::geometry::Vec3;
+use crate::pattern::{Pattern, PatternMesh};
+use serde::{Deserialize, Serialize};
+
+/// A pattern, meshed and sewn, with the drape its file brought, if any.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Garment {
+    /// For messages and pictures: the file's stem.
+    pub name: String,
+    /// What the pattern maker drew.
+    pub pattern: Pattern,
+    /// The same, meshed and sewn.
+    pub mesh: PatternMesh,
+    /// Positions on the source body \[m\], `[cloth vertex]`; none for a pattern that only waits
+    /// around the body.
+    pub drape: Option<Vec<Vec3>>,
+}
+
+impl Garment {
+    /// Cloth positions of the flat panels as placed around the body \[m\]; sewn vertices take the
+    /// mean of their copies.
+    pub fn placed(&self) -> Vec<Vec3> {
+        let mut placed = vec![Vec3::zeros(); self.mesh.x_bar.len()];
+        for (panel, range) in self.pattern.panels.iter().zip(&self.mesh.panel_vertices) {
+            for v in range.clone() {
+                placed[v] = panel.placement.place(self.mesh.x_bar[v]);
+            }
+        }
+        self.mesh.sew(&placed)
+    }
+}
+
+/// What the cloth is made of. Warp runs along the y axis of each panel, weft along x.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Fabric {
+    /// Tensile stiffness along the warp \[N/m\]. Higher stretches less and drapes slower.
+    /// Jersey 100–500, woven 1e3–1e4. The paper gives none.
+    pub warp: f64,
+    /// Tensile stiffness along the weft \[N/m\].
+    pub weft: f64,
+    /// Coupling of warp and weft, as Poisson's ratio \[–\]; 0 to 0.5.
+    pub poisson: f64,
+    /// Shear stiffness \[N/m\].
+    pub shear: f64,
+    /// Bending rigidity \[N·m\]. 5e-6 soft, 1e-4 stiff.
+    pub bending: f64,
+    /// Mass per area \[kg/m²\]. 0.1 light, 0.4 heavy.
+    pub density: f64,
+}
+
+impl Default for Fabric {
+    /// A medium jersey-like cloth: E·h = 1000 N/m, ν = 0.3, isotropic; 200 g/m²; bending as of
+    /// soft shirting (about 0.1 gf·cm²/cm).
+    fn default() -> Self {
+        Self {
+            warp: 1000.0,
+            weft: 1000.0,
+            poisson: 0.3,
+            shear: 1000.0 / 2.6,
+            bending: 1e-5,
+            density: 0.2,
+        }
+    }
+}

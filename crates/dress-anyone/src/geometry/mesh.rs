@@ -1,0 +1,53 @@
+//! A triangle mesh in space and its vertex normals.
+
+use super::Vec3;
+
+/// Positions and triangles; triangles are counter-clockwise seen from outside.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct TriangleMesh {
+    /// Vertex positions \[m\], `[vertex]`.
+    pub positions: Vec<Vec3>,
+    /// Vertex indices, `[triangle][corner]`.
+    pub triangles: Vec<[u32; 3]>,
+}
+
+impl TriangleMesh {
+    /// The corners of triangle `t`.
+    pub fn corners(&self, t: usize) -> [Vec3; 3] {
+        self.triangles[t].map(|v| self.positions[v as usize])
+    }
+
+    /// Smallest and largest corner of the box around all vertices \[m\].
+    pub fn bounds(&self) -> (Vec3, Vec3) {
+        bounds(&self.positions)
+    }
+
+    /// Unit normals per vertex, area-weighted; zero where a vertex has no triangle.
+    pub fn vertex_normals(&self) -> Vec<Vec3> {
+        vertex_normals(&self.positions, &self.triangles)
+    }
+}
+
+/// Smallest and largest corner of the box around `points`; infinite and reversed when empty.
+pub fn bounds(points: &[Vec3]) -> (Vec3, Vec3) {
+    let start = (Vec3::repeat(f64::INFINITY), Vec3::repeat(f64::NEG_INFINITY));
+    points
+        .iter()
+        .fold(start, |(low, high), p| (low.inf(p), high.sup(p)))
+}
+
+/// Unit normals per vertex, area-weighted; zero where a vertex has no triangle.
+pub fn vertex_normals(positions: &[Vec3], triangles: &[[u32; 3]]) -> Vec<Vec3> {
+    let mut normals = vec![Vec3::zeros(); positions.len()];
+    for triangle in triangles {
+        let [a, b, c] = triangle.map(|v| positions[v as usize]);
+        let doubled_area = (b - a).cross(&(c - a));
+        for &v in triangle {
+            normals[v as usize] += doubled_area;
+        }
+    }
+    for normal in &mut normals {
+        *normal = normal.try_normalize(0.0).unwrap_or_else(Vec3::zeros);
+    }
+    normals
+}

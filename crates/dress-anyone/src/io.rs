@@ -1,0 +1,1 @@
+//! Files. The only place that knows their units, axes and index bases; inside, all is SI and y up.

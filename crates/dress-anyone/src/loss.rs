@@ -1,0 +1,1 @@
+//! What the refit minimises (paper §4.4).

@@ -1,0 +1,1 @@
+//! The drape (paper §3): cloth on a static body, brought to rest, and its derivatives.
