@@ -1,1 +1,18 @@
 //! The drape (paper §3): cloth on a static body, brought to rest, and its derivatives.
+//!
+//! [`cloth`] is the topology, [`energy`] the pieces of the total energy U(x; x̄), each with its
+//! derivatives beside it. [`step`] is the paper's XPBD integrator, which brings placed panels
+//! together; [`equilibrium`] then finds f = −∂U/∂x = 0 by Newton's method, and [`adjoint`]
+//! differentiates that state. [`drape`] does the three in order.
+
+pub mod adjoint;
+pub mod cloth;
+pub mod drape;
+pub mod energy;
+pub mod equilibrium;
+pub mod sparse;
+pub mod step;
+pub mod system;
+pub use cloth::{Cloth, Hold, Rest};
+pub use drape::{Drape, Scene, SimParams, Start, drape};
+pub use system::Assembly;

@@ -1,0 +1,274 @@
+//! What the simulator knows of a garment: its topology and fabric ([`Cloth`]), and what follows
+//! from one rest shape x̄ ([`Rest`]).
+
+use super::energy::bend::RestHinge;
+use super::energy::membrane::{Elasticity, RestTriangle};
+use crate::garment::Fabric;
+use crate::geometry::{Vec2, Vec3};
+use crate::pattern::PatternMesh;
+use std::collections::BTreeMap;
+
+/// Standard gravity \[m/s²\], y up.
+pub const GRAVITY: Vec3 = Vec3::new(0.0, -9.81, 0.0);
+
+/// A garment's topology and fabric: everything that does not change while x̄ does.
+#[derive(Clone, Debug)]
+pub struct Cloth {
+    /// Pattern vertices of each triangle, counter-clockwise at rest.
+    pub rest_triangles: Vec<[u32; 3]>,
+    /// Cloth vertices of the same triangles.
+    pub triangles: Vec<[u32; 3]>,
+    /// Interior edges of the welded mesh.
+    pub hinges: Vec<Hinge>,
+    /// Cloth vertex of each pattern vertex.
+    pub sewing: Vec<u32>,
+    /// Number of cloth vertices.
+    pub vertex_count: usize,
+    /// Area of each cloth vertex in the reference pattern \[m²\]; constant, so that contact
+    /// stiffness has no derivative by x̄.
+    pub reference_area: Vec<f64>,
+    /// Membrane stiffness.
+    pub elasticity: Elasticity,
+    /// Bending rigidity \[N·m\].
+    pub bending: f64,
+    /// Areal density \[kg/m²\].
+    pub density: f64,
+    /// Vertices kept near a height.
+    pub holds: Vec<Hold>,
+}
+
+/// An edge of the welded mesh with a triangle on either side, as two pattern-space half hinges.
+#[derive(Clone, Copy, Debug)]
+pub struct Hinge {
+    /// Cloth vertices: the shared edge, then the opposite corners.
+    pub vertices: [u32; 4],
+    /// Pattern vertices (p0, p1, opposite) of each side.
+    pub rest: [[u32; 3]; 2],
+}
+
+/// A vertex kept near a height by a spring, as an elastic waistband or a neckline tape does:
+/// U = ½ k (y − height)².
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hold {
+    /// Cloth vertex.
+    pub vertex: u32,
+    /// \[m\].
+    pub height: f64,
+    /// \[N/m\].
+    pub stiffness: f64,
+}
+
+impl Cloth {
+    /// Prepares the meshed pattern for draping in `fabric`.
+    pub fn new(mesh: &PatternMesh, fabric: &Fabric) -> Self {
+        let triangles = mesh.cloth_triangles();
+        let mut reference_area = vec![0.0; mesh.cloth_vertex_count];
+        for (t, triangle) in triangles.iter().enumerate() {
+            for &a in triangle {
+                reference_area[a as usize] += mesh.rest_area(t, &mesh.x_bar) / 3.0;
+            }
+        }
+        Self {
+            hinges: hinges(&mesh.triangles, &triangles),
+            rest_triangles: mesh.triangles.clone(),
+            triangles,
+            sewing: mesh.sewing.clone(),
+            vertex_count: mesh.cloth_vertex_count,
+            reference_area,
+            elasticity: Elasticity::from(fabric),
+            bending: fabric.bending,
+            density: fabric.density,
+            holds: Vec::new(),
+        }
+    }
+
+    /// The rest quantities that follow from x̄.
+    pub fn at_rest(&self, x_bar: &[Vec2]) -> Rest {
+        let at = |t: [u32; 3]| t.map(|v| x_bar[v as usize]);
+        let triangles: Vec<_> = self
+            .rest_triangles
+            .iter()
+            .map(|t| RestTriangle::new(at(*t)))
+            .collect();
+        let hinges = self
+            .hinges
+            .iter()
+            .map(|hinge| RestHinge::new(hinge.rest.map(at), self.bending))
+            .collect();
+        let mut mass = vec![0.0; self.vertex_count];
+        for (rest, triangle) in triangles.iter().zip(&self.triangles) {
+            for &a in triangle {
+                mass[a as usize] += self.density * rest.area / 3.0;
+            }
+        }
+        Rest {
+            triangles,
+            hinges,
+            mass,
+        }
+    }
+}
+
+/// What follows from one rest shape x̄.
+#[derive(Clone, Debug)]
+pub struct Rest {
+    /// `[triangle]`.
+    pub triangles: Vec<RestTriangle>,
+    /// `[hinge]`.
+    pub hinges: Vec<RestHinge>,
+    /// Lumped mass \[kg\], `[cloth vertex]`.
+    pub mass: Vec<f64>,
+}
+
+impl Rest {
+    /// ‖m‖₂ |g| \[N\]: what force residuals are relative to.
+    pub fn weight(&self) -> f64 {
+        self.mass.iter().map(|m| m * m).sum::<f64>().sqrt() * GRAVITY.norm()
+    }
+}
+
+/// The interior edges of the welded mesh; an edge of more than two triangles gets one hinge per
+/// consecutive pair.
+fn hinges(rest: &[[u32; 3]], welded: &[[u32; 3]]) -> Vec<Hinge> {
+    let mut sides: BTreeMap<(u32, u32), Vec<(usize, usize)>> = BTreeMap::new();
+    for (t, triangle) in welded.iter().enumerate() {
+        for corner in 0..3 {
+            let (a, b) = (triangle[corner], triangle[(corner + 1) % 3]);
+            sides
+                .entry((a.min(b), a.max(b)))
+                .or_default()
+                .push((t, corner));
+        }
+    }
+    // (p0, p1, opposite) of the side whose edge starts at `corner`, run from cloth vertex `first`.
+    let side = |(t, corner): (usize, usize), first: u32| {
+        let [a, b, c] = [0, 1, 2].map(|i| rest[t][(corner + i) % 3]);
+        if welded[t][corner] == first {
+            [a, b, c]
+        } else {
+            [b, a, c]
+        }
+    };
+    let opposite = |(t, corner): (usize, usize)| welded[t][(corner + 2) % 3];
+    let mut hinges = Vec::new();
+    for ((x0, x1), at) in sides {
+        for pair in at.windows(2) {
+            hinges.push(Hinge {
+                vertices: [x0, x1, opposite(pair[0]), opposite(pair[1])],
+                rest: [side(pair[0], x0), side(pair[1], x0)],
+            });
+        }
+    }
+    hinges
+}
+
+#[cfg(test)]
+pub(crate) mod fixtures {
+    //! Small cloths shared by the tests of the simulator.
+
+    use super::*;
+
+    /// A rectangular panel of staggered triangles, `columns` × `rows` cells of side `h` \[m\].
+    pub(crate) fn sheet(columns: usize, rows: usize, h: f64) -> PatternMesh {
+        let mut x_bar = Vec::new();
+        let mut triangles = Vec::new();
+        for j in 0..=rows {
+            for i in 0..=columns {
+                x_bar.push(Vec2::new(h * i as f64, h * j as f64));
+            }
+        }
+        let at = |i: usize, j: usize| (j * (columns + 1) + i) as u32;
+        for j in 0..rows {
+            for i in 0..columns {
+                let [a, b, c, d] = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
+                // Diagonals alternate, so that no direction is favoured.
+                if (i + j) % 2 == 0 {
+                    triangles.extend([[a, b, c], [a, c, d]]);
+                } else {
+                    triangles.extend([[a, b, d], [b, c, d]]);
+                }
+            }
+        }
+        let count = x_bar.len();
+        PatternMesh {
+            panel_vertices: vec![0..count],
+            panel_triangles: vec![0..triangles.len()],
+            right_side_up: vec![true],
+            edge_vertices: vec![vec![
+                (0..=columns).map(|i| at(i, 0)).collect(),
+                (0..=rows).map(|j| at(columns, j)).collect(),
+                (0..=columns).rev().map(|i| at(i, rows)).collect(),
+                (0..=rows).rev().map(|j| at(0, j)).collect(),
+            ]],
+            sewing: (0..count as u32).collect(),
+            cloth_vertex_count: count,
+            x_bar,
+            triangles,
+        }
+    }
+
+    /// The sheet with its left side sewn to its right side: a tube about the y axis.
+    pub(crate) fn tube(columns: usize, rows: usize, h: f64) -> PatternMesh {
+        let mut mesh = sheet(columns, rows, h);
+        let mut next = 0;
+        for v in 0..mesh.x_bar.len() {
+            let column = v % (columns + 1);
+            mesh.sewing[v] = if column == columns {
+                mesh.sewing[v - columns]
+            } else {
+                next += 1;
+                next - 1
+            };
+        }
+        mesh.cloth_vertex_count = next as usize;
+        mesh
+    }
+
+    /// The tube's cloth vertices on a cylinder of radius `r` \[m\] about the y axis.
+    pub(crate) fn rolled(mesh: &PatternMesh, width: f64, r: f64) -> Vec<Vec3> {
+        let flat: Vec<Vec3> = mesh
+            .x_bar
+            .iter()
+            .map(|p| {
+                let angle = std::f64::consts::TAU * p.x / width;
+                Vec3::new(r * angle.sin(), p.y, r * angle.cos())
+            })
+            .collect();
+        mesh.sew(&flat)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+
+    #[test]
+    fn seams_have_hinges_and_hems_have_none() {
+        let (columns, rows) = (8, 3);
+        let cloth = Cloth::new(&fixtures::tube(columns, rows, 0.1), &Fabric::default());
+        // 3F = 2E + B over all edges, B the two rims.
+        let edges = (3 * cloth.triangles.len() + 2 * columns) / 2;
+        assert_eq!(cloth.hinges.len(), edges - 2 * columns);
+    }
+
+    #[test]
+    fn a_flat_panel_has_no_curvature_anywhere() {
+        let mesh = fixtures::sheet(4, 4, 0.1);
+        let cloth = Cloth::new(&mesh, &Fabric::default());
+        let rest = cloth.at_rest(&mesh.x_bar);
+        for (hinge, at_rest) in cloth.hinges.iter().zip(&rest.hinges) {
+            let x = hinge.vertices.map(|a| {
+                let p = mesh.x_bar[a as usize];
+                Vec3::new(p.x, p.y, 0.0)
+            });
+            // Round-off of decimetres.
+            assert!(at_rest.curvature_vector(x).norm() < 1e-15);
+        }
+        assert_relative_eq!(
+            rest.mass.iter().sum::<f64>(),
+            0.2 * 0.16,
+            max_relative = 1e-12
+        );
+    }
+}

@@ -1,0 +1,5 @@
+//! The pieces of the total energy, one per file, value beside derivatives.
+
+pub mod bend;
+pub mod contact;
+pub mod membrane;

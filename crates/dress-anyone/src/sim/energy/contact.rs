@@ -1,0 +1,201 @@
+//! Contact of cloth vertices with the static body: a compliant one-sided constraint (Stuyck & Chen
+//! 2023), U = ½ κ min(d(x) − h, 0)² per vertex, with κ = κ₀ · (reference vertex area).
+//!
+//! The distance d comes from a [`Surface`] with a gradient and a Hessian, so force and stiffness
+//! are exact derivatives of the energy, contact curvature included.
+
+use crate::geometry::{Mat3, Vec3};
+use serde::{Deserialize, Serialize};
+
+/// Something solid that cloth lies on.
+pub trait Surface: Sync {
+    /// Signed distance \[m\] (positive outside) and its gradient; none where nothing is near.
+    fn distance(&self, p: Vec3) -> Option<(f64, Vec3)>;
+    /// Hessian of the distance \[1/m\]; zero where nothing is near.
+    fn curvature(&self, p: Vec3) -> Mat3;
+}
+
+/// No body: cloth hangs free.
+#[derive(Clone, Copy, Debug)]
+pub struct Nothing;
+
+impl Surface for Nothing {
+    fn distance(&self, _: Vec3) -> Option<(f64, Vec3)> {
+        None
+    }
+
+    fn curvature(&self, _: Vec3) -> Mat3 {
+        Mat3::zeros()
+    }
+}
+
+/// How cloth meets the body.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct ContactParams {
+    /// Distance h at which cloth vertices start to feel the body \[m\]: half the cloth's
+    /// thickness plus what edges cut off at curved places. 2e-3 to 5e-3. The paper gives none.
+    pub thickness: f64,
+    /// κ₀ \[N/m³\]: pressure per depth. Higher sinks in less and solves slower.
+    pub stiffness: f64,
+}
+
+impl Default for ContactParams {
+    fn default() -> Self {
+        Self {
+            thickness: 3e-3,
+            stiffness: 5e6,
+        }
+    }
+}
+
+/// Energy of one vertex of contact stiffness `kappa` \[N/m\] at p, with offset h \[m\].
+pub fn energy(surface: &impl Surface, kappa: f64, h: f64, p: Vec3) -> f64 {
+    match surface.distance(p) {
+        Some((d, _)) if d < h => 0.5 * kappa * (d - h) * (d - h),
+        _ => 0.0,
+    }
+}
+
+/// −∂U/∂p \[N\].
+pub fn force(surface: &impl Surface, kappa: f64, h: f64, p: Vec3) -> Vec3 {
+    match surface.distance(p) {
+        Some((d, n)) if d < h => n * (-kappa * (d - h)),
+        _ => Vec3::zeros(),
+    }
+}
+
+/// ∂²U/∂p² \[N/m\]; none where there is no contact. `clamped` drops the curvature term, which
+/// makes it positive semi-definite.
+pub fn stiffness(
+    surface: &impl Surface,
+    kappa: f64,
+    h: f64,
+    p: Vec3,
+    clamped: bool,
+) -> Option<Mat3> {
+    let (d, n) = surface.distance(p).filter(|(d, _)| *d < h)?;
+    let mut k = n * n.transpose();
+    if !clamped {
+        k += surface.curvature(p) * (d - h);
+    }
+    Some(k * kappa)
+}
+
+#[cfg(test)]
+pub(crate) mod fixtures {
+    //! Solids with closed-form distances.
+
+    use super::*;
+
+    /// The half-space below `height`.
+    pub(crate) struct Floor {
+        pub(crate) height: f64,
+    }
+
+    impl Surface for Floor {
+        fn distance(&self, p: Vec3) -> Option<(f64, Vec3)> {
+            Some((p.y - self.height, Vec3::y()))
+        }
+
+        fn curvature(&self, _: Vec3) -> Mat3 {
+            Mat3::zeros()
+        }
+    }
+
+    /// A leaning, flattened cone: at height y the points with
+    /// hypot(x − lean · y, flat · z) = radius − slope · y.
+    /// Round (`flat` 1) and upright (`lean` 0), cloth can turn on it freely.
+    #[derive(Clone, Copy)]
+    pub(crate) struct Cone {
+        pub(crate) radius: f64,
+        pub(crate) slope: f64,
+        pub(crate) flat: f64,
+        pub(crate) lean: f64,
+    }
+
+    impl Cone {
+        /// Rows map p to (x − lean · y, flat · z).
+        fn across(&self) -> (Vec3, Vec3) {
+            (
+                Vec3::new(1.0, -self.lean, 0.0),
+                Vec3::new(0.0, 0.0, self.flat),
+            )
+        }
+    }
+
+    impl Surface for Cone {
+        fn distance(&self, p: Vec3) -> Option<(f64, Vec3)> {
+            let (u, v) = self.across();
+            let rho = u.dot(&p).hypot(v.dot(&p));
+            let cosine = 1.0 / self.slope.hypot(1.0);
+            let d = (rho - self.radius + self.slope * p.y) * cosine;
+            let outward = (u * u.dot(&p) + v * v.dot(&p)) / rho;
+            Some((d, (outward + Vec3::y() * self.slope) * cosine))
+        }
+
+        fn curvature(&self, p: Vec3) -> Mat3 {
+            let (u, v) = self.across();
+            let rho = u.dot(&p).hypot(v.dot(&p));
+            let around = (v * u.dot(&p) - u * v.dot(&p)) / rho;
+            around * around.transpose() / (rho * self.slope.hypot(1.0))
+        }
+    }
+
+    /// A ball about the origin.
+    pub(crate) struct Ball {
+        pub(crate) radius: f64,
+    }
+
+    impl Surface for Ball {
+        fn distance(&self, p: Vec3) -> Option<(f64, Vec3)> {
+            Some((p.norm() - self.radius, p.normalize()))
+        }
+
+        fn curvature(&self, p: Vec3) -> Mat3 {
+            let n = p.normalize();
+            (Mat3::identity() - n * n.transpose()) / p.norm()
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::fixtures::{Ball, Cone};
+    use super::*;
+    use crate::check::assert_derivative;
+
+    fn check(surface: &impl Surface, p: Vec3) {
+        let (kappa, h) = (3.0, 0.1);
+        let d = Vec3::new(0.3, -0.5, 0.7);
+        let q = Vec3::new(-0.2, 0.9, 0.4);
+        let u = |s: f64| energy(surface, kappa, h, p + d * s);
+        assert!(u(0.0) > 0.0, "the point must touch");
+        let slope = -force(surface, kappa, h, p).dot(&d);
+        assert_derivative(u, slope, 1e-5, 1e-3, 1e-7);
+        let k = stiffness(surface, kappa, h, p, false).expect("touches");
+        let g = |s: f64| -force(surface, kappa, h, p + d * s).dot(&q);
+        assert_derivative(g, q.dot(&(k * d)), 1e-5, 1e-3, 1e-7);
+    }
+
+    #[test]
+    fn force_and_stiffness_are_derivatives_of_the_energy() {
+        check(&Ball { radius: 1.0 }, Vec3::new(0.6, 0.5, -0.68));
+        let cone = Cone {
+            radius: 1.0,
+            slope: 0.3,
+            flat: 0.9,
+            lean: 0.1,
+        };
+        check(&cone, Vec3::new(0.6, -0.1, 0.83));
+    }
+
+    #[test]
+    fn nothing_pushes_where_nothing_touches() {
+        let ball = Ball { radius: 1.0 };
+        let far = Vec3::new(2.0, 0.0, 0.0);
+        assert_eq!(energy(&ball, 1.0, 0.1, far), 0.0);
+        assert_eq!(force(&ball, 1.0, 0.1, far), Vec3::zeros());
+        assert!(stiffness(&ball, 1.0, 0.1, far, false).is_none());
+    }
+}

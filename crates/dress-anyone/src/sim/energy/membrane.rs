@@ -1,0 +1,391 @@
+//! Stretch and shear: St. Venant–Kirchhoff with Green strain, one element per triangle.
+//!
+//! F = D_s D_m⁻¹, ε = ½(FᵀF − I), S = 𝔻ε, U = ½ Ā ε:S. As an XPBD constraint it is the paper's
+//! (§3.1, after Stuyck & Chen 2023): C = (ε_uu, ε_vv, 2ε_uv) with compliance 𝔻⁻¹/Ā.
+//! u runs along the panel's x axis (weft), v along its y axis (warp).
+
+use crate::garment::Fabric;
+use crate::geometry::{Mat2, Mat3, Vec2, Vec3};
+use nalgebra::{Matrix3x2, Vector3};
+
+/// 3×2: the deformation gradient and everything of its shape.
+pub type Mat3x2 = Matrix3x2<f64>;
+
+/// Stiffness 𝔻 on (ε_uu, ε_vv, 2ε_uv) \[N/m\]: orthotropic, without coupling of shear and stretch.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Elasticity {
+    /// 𝔻₀₀, weft.
+    pub weft: f64,
+    /// 𝔻₁₁, warp.
+    pub warp: f64,
+    /// 𝔻₀₁.
+    pub coupling: f64,
+    /// 𝔻₂₂.
+    pub shear: f64,
+}
+
+impl From<&Fabric> for Elasticity {
+    /// Plane stress: E/(1 − ν²) on the diagonal, ν times their geometric mean beside it, which is
+    /// positive definite for every ν < 1.
+    fn from(fabric: &Fabric) -> Self {
+        let plane = 1.0 - fabric.poisson * fabric.poisson;
+        Self {
+            weft: fabric.weft / plane,
+            warp: fabric.warp / plane,
+            coupling: fabric.poisson * (fabric.weft * fabric.warp).sqrt() / plane,
+            shear: fabric.shear,
+        }
+    }
+}
+
+impl Elasticity {
+    /// 𝔻 applied to a symmetric strain, as a symmetric stress \[N/m\].
+    pub fn stress(&self, strain: &Mat2) -> Mat2 {
+        let uu = self.weft * strain.m11 + self.coupling * strain.m22;
+        let vv = self.coupling * strain.m11 + self.warp * strain.m22;
+        let uv = self.shear * (strain.m12 + strain.m21);
+        Mat2::new(uu, uv, uv, vv)
+    }
+}
+
+/// A triangle at rest.
+#[derive(Clone, Copy, Debug)]
+pub struct RestTriangle {
+    /// D_m⁻¹ \[1/m\]; rows are the gradients of the hat functions of corners 1 and 2.
+    pub inverse: Mat2,
+    /// Ā \[m²\].
+    pub area: f64,
+}
+
+impl RestTriangle {
+    /// From its corners in the plane; the area must not be zero.
+    pub fn new(corners: [Vec2; 3]) -> Self {
+        let edges = Mat2::from_columns(&[corners[1] - corners[0], corners[2] - corners[0]]);
+        let doubled = edges.determinant();
+        let adjugate = Mat2::new(edges.m22, -edges.m12, -edges.m21, edges.m11);
+        Self {
+            inverse: adjugate / doubled,
+            area: 0.5 * doubled,
+        }
+    }
+
+    /// Gradients of the three hat functions \[1/m\].
+    pub fn gradients(&self) -> [Vec2; 3] {
+        let b1 = self.inverse.row(0).transpose();
+        let b2 = self.inverse.row(1).transpose();
+        [-b1 - b2, b1, b2]
+    }
+
+    /// Σ_a y_a b_aᵀ: the deformation gradient for positions, its variation for displacements.
+    pub fn gradient_of(&self, y: [Vec3; 3]) -> Mat3x2 {
+        Mat3x2::from_columns(&[y[1] - y[0], y[2] - y[0]]) * self.inverse
+    }
+}
+
+/// Green strain of a deformation gradient.
+fn green_strain(f: &Mat3x2) -> Mat2 {
+    (f.transpose() * f - Mat2::identity()) * 0.5
+}
+
+/// U \[J\].
+pub fn energy(rest: &RestTriangle, d: &Elasticity, x: [Vec3; 3]) -> f64 {
+    let strain = green_strain(&rest.gradient_of(x));
+    0.5 * rest.area * strain.dot(&d.stress(&strain))
+}
+
+/// −∂U/∂x \[N\], per corner.
+pub fn force(rest: &RestTriangle, d: &Elasticity, x: [Vec3; 3]) -> [Vec3; 3] {
+    let f = rest.gradient_of(x);
+    let p = f * d.stress(&green_strain(&f)) * (-rest.area);
+    rest.gradients().map(|b| p * b)
+}
+
+/// ∂²U/∂x² \[N/m\], blocks `[a][b]` for b ≤ a. `clamped` drops the compressive part of the stress,
+/// which makes every element positive semi-definite.
+pub fn stiffness(
+    rest: &RestTriangle,
+    d: &Elasticity,
+    x: [Vec3; 3],
+    clamped: bool,
+) -> [[Mat3; 3]; 3] {
+    let f = rest.gradient_of(x);
+    let mut s = d.stress(&green_strain(&f));
+    if clamped {
+        s = positive_part(&s);
+    }
+    let (fu, fv) = (f.column(0).into_owned(), f.column(1).into_owned());
+    let (uu, vv, uv) = (
+        fu * fu.transpose(),
+        fv * fv.transpose(),
+        fu * fv.transpose(),
+    );
+    let vu = uv.transpose();
+    let b = rest.gradients();
+    let mut blocks = [[Mat3::zeros(); 3]; 3];
+    for i in 0..3 {
+        for j in 0..=i {
+            let (p, q) = (b[i], b[j]);
+            // F (N_p 𝔻 N_qᵀ) Fᵀ with N_p = [[p.x, 0, p.y], [0, p.y, p.x]].
+            let m_uu = d.weft * p.x * q.x + d.shear * p.y * q.y;
+            let m_uv = d.coupling * p.x * q.y + d.shear * p.y * q.x;
+            let m_vu = d.coupling * p.y * q.x + d.shear * p.x * q.y;
+            let m_vv = d.warp * p.y * q.y + d.shear * p.x * q.x;
+            let geometric = p.dot(&(s * q));
+            blocks[i][j] =
+                (uu * m_uu + uv * m_uv + vu * m_vu + vv * m_vv + Mat3::identity() * geometric)
+                    * rest.area;
+        }
+    }
+    blocks
+}
+
+/// The part of a symmetric 2×2 matrix with non-negative eigenvalues.
+fn positive_part(s: &Mat2) -> Mat2 {
+    let mean = 0.5 * (s.m11 + s.m22);
+    let half = Vec2::new(0.5 * (s.m11 - s.m22), s.m12);
+    let radius = half.norm();
+    let (high, low) = (mean + radius, mean - radius);
+    if low >= 0.0 {
+        return *s;
+    }
+    if high <= 0.0 {
+        return Mat2::zeros();
+    }
+    // high · (projector on the stretched direction); radius > 0 here since high > 0 > low.
+    (Mat2::identity() + Mat2::new(half.x, half.y, half.y, -half.x) / radius) * (0.5 * high)
+}
+
+/// The constraint C = (ε_uu, ε_vv, 2ε_uv) and its gradients ∂C/∂x_a (rows: entries of C).
+pub fn constraint(rest: &RestTriangle, x: [Vec3; 3]) -> (Vector3<f64>, [Mat3; 3]) {
+    let f = rest.gradient_of(x);
+    let (fu, fv) = (f.column(0).into_owned(), f.column(1).into_owned());
+    let c = Vector3::new(
+        0.5 * (fu.dot(&fu) - 1.0),
+        0.5 * (fv.dot(&fv) - 1.0),
+        fu.dot(&fv),
+    );
+    let rows = rest.gradients().map(|b| {
+        Mat3::from_rows(&[
+            (fu * b.x).transpose(),
+            (fv * b.y).transpose(),
+            (fv * b.x + fu * b.y).transpose(),
+        ])
+    });
+    (c, rows)
+}
+
+/// Gradient of λ·f by the rest corners x̄ (METHOD: W = −λ·f = Ā S:e_L), where `weight` is
+/// (ρ/3) Σ_a λ_a·g, the part of λ·f that gravity adds per rest area.
+pub fn rest_pull_back(
+    rest: &RestTriangle,
+    d: &Elasticity,
+    x: [Vec3; 3],
+    lambda: [Vec3; 3],
+    weight: f64,
+) -> [Vec2; 3] {
+    let f = rest.gradient_of(x);
+    let l = rest.gradient_of(lambda);
+    let s = d.stress(&green_strain(&f));
+    let fl = f.transpose() * l;
+    let e = (fl + fl.transpose()) * 0.5;
+    let t = d.stress(&e);
+    let metric = f.transpose() * f;
+    let m = (Mat2::identity() * s.dot(&e) - e * s * 2.0 - metric * t) * (-rest.area)
+        + Mat2::identity() * (rest.area * weight);
+    let g = m * rest.inverse.transpose();
+    let (g1, g2) = (g.column(0).into_owned(), g.column(1).into_owned());
+    [-g1 - g2, g1, g2]
+}
+
+/// Change of the forces under a motion `delta` of the rest corners, at fixed x; `gravity` is
+/// ρ g/3, which each corner gets per rest area.
+pub fn rest_push_forward(
+    rest: &RestTriangle,
+    d: &Elasticity,
+    x: [Vec3; 3],
+    delta: [Vec2; 3],
+    gravity: Vec3,
+) -> [Vec3; 3] {
+    let f = rest.gradient_of(x);
+    let s = d.stress(&green_strain(&f));
+    let z = Mat2::from_columns(&[delta[1] - delta[0], delta[2] - delta[0]]) * rest.inverse;
+    let cz = f.transpose() * f * z;
+    let s_delta = d.stress(&((cz + cz.transpose()) * -0.5));
+    let f_delta = -f * z;
+    let p = f * s * z.trace() + f_delta * s + f * s_delta - f * s * z.transpose();
+    let mass = gravity * (rest.area * z.trace());
+    rest.gradients().map(|b| p * b * -rest.area + mass)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::check::{assert_derivative, noise};
+    use approx::assert_relative_eq;
+
+    const ANISOTROPIC: Elasticity = Elasticity {
+        weft: 900.0,
+        warp: 1500.0,
+        coupling: 300.0,
+        shear: 250.0,
+    };
+
+    fn rest_corners() -> [Vec2; 3] {
+        [
+            Vec2::new(0.1, 0.2),
+            Vec2::new(1.0, 0.3),
+            Vec2::new(0.4, 1.2),
+        ]
+    }
+
+    /// Order-one noise about the rest shape: strains of a few tenths, tension and compression.
+    fn scene(seed: usize) -> ([Vec3; 3], [Vec3; 3]) {
+        let x = std::array::from_fn(|a| {
+            let r = rest_corners()[a];
+            let n = |c: usize| 0.2 * noise(seed + 7 * a + c);
+            Vec3::new(r.x + n(0), r.y + n(1), n(2))
+        });
+        let d = std::array::from_fn(|a| {
+            Vec3::new(
+                noise(seed + 31 + a),
+                noise(seed + 47 + a),
+                noise(seed + 61 + a),
+            )
+        });
+        (x, d)
+    }
+
+    fn moved(x: [Vec3; 3], d: [Vec3; 3], s: f64) -> [Vec3; 3] {
+        std::array::from_fn(|a| x[a] + d[a] * s)
+    }
+
+    fn dot(a: [Vec3; 3], b: [Vec3; 3]) -> f64 {
+        a.iter().zip(&b).map(|(a, b)| a.dot(b)).sum()
+    }
+
+    #[test]
+    fn force_is_minus_the_slope_of_the_energy() {
+        let rest = RestTriangle::new(rest_corners());
+        for seed in 0..10 {
+            let (x, d) = scene(100 * seed);
+            let slope = -dot(force(&rest, &ANISOTROPIC, x), d);
+            let u = |s| energy(&rest, &ANISOTROPIC, moved(x, d, s));
+            assert_derivative(u, slope, 1e-5, 1.0, 1e-7);
+        }
+    }
+
+    #[test]
+    fn stiffness_is_minus_the_slope_of_the_force() {
+        let rest = RestTriangle::new(rest_corners());
+        for seed in 0..10 {
+            let (x, d) = scene(100 * seed);
+            let (_, q) = scene(100 * seed + 50);
+            let k = stiffness(&rest, &ANISOTROPIC, x, false);
+            let mut bilinear = 0.0;
+            for a in 0..3 {
+                for b in 0..3 {
+                    let block = if b <= a { k[a][b] } else { k[b][a].transpose() };
+                    bilinear += q[a].dot(&(block * d[b]));
+                }
+            }
+            let f = |s| -dot(force(&rest, &ANISOTROPIC, moved(x, d, s)), q);
+            assert_derivative(f, bilinear, 1e-5, 1.0, 1e-7);
+        }
+    }
+
+    #[test]
+    fn the_clamped_stiffness_is_positive_semi_definite() {
+        let rest = RestTriangle::new(rest_corners());
+        for seed in 0..50 {
+            let (x, d) = scene(100 * seed);
+            let k = stiffness(&rest, &ANISOTROPIC, x, true);
+            let mut bilinear = 0.0;
+            for a in 0..3 {
+                for b in 0..3 {
+                    let block = if b <= a { k[a][b] } else { k[b][a].transpose() };
+                    bilinear += d[a].dot(&(block * d[b]));
+                }
+            }
+            // Round-off of entries of order 1e3.
+            assert!(bilinear > -1e-9, "{bilinear}");
+        }
+    }
+
+    #[test]
+    fn the_constraint_form_is_the_same_energy() {
+        let rest = RestTriangle::new(rest_corners());
+        let (x, d) = scene(3);
+        let (c, j) = constraint(&rest, x);
+        let stress = ANISOTROPIC.stress(&Mat2::new(c[0], 0.5 * c[2], 0.5 * c[2], c[1]));
+        let quadratic = c[0] * stress.m11 + c[1] * stress.m22 + c[2] * stress.m12;
+        assert_relative_eq!(
+            0.5 * rest.area * quadratic,
+            energy(&rest, &ANISOTROPIC, x),
+            max_relative = 1e-12
+        );
+        for row in 0..3 {
+            let slope = (0..3).map(|a| (j[a] * d[a])[row]).sum();
+            assert_derivative(
+                |s| constraint(&rest, moved(x, d, s)).0[row],
+                slope,
+                1e-5,
+                1.0,
+                1e-8,
+            );
+        }
+    }
+
+    #[test]
+    fn rest_derivatives_agree_with_differences_and_with_each_other() {
+        let gravity = Vec3::new(0.3, -9.81, 0.1) * (50.0 / 3.0);
+        for seed in 0..10 {
+            let (x, lambda) = scene(100 * seed);
+            let delta: [Vec2; 3] =
+                std::array::from_fn(|a| Vec2::new(noise(seed + 3 * a), noise(seed + 9 + 5 * a)));
+            let moved_rest = |s: f64| {
+                let c = rest_corners();
+                RestTriangle::new(std::array::from_fn(|a| c[a] + delta[a] * s))
+            };
+            let lambda_dot_force = |s: f64| {
+                let rest = moved_rest(s);
+                let weight: f64 = lambda.iter().map(|l| l.dot(&gravity) * rest.area).sum();
+                dot(force(&rest, &ANISOTROPIC, x), lambda) + weight
+            };
+            let rest = moved_rest(0.0);
+            let per_area = lambda.iter().map(|l| l.dot(&gravity)).sum();
+            let hat = rest_pull_back(&rest, &ANISOTROPIC, x, lambda, per_area);
+            let pulled: f64 = hat.iter().zip(&delta).map(|(h, d)| h.dot(d)).sum();
+            assert_derivative(lambda_dot_force, pulled, 1e-6, 1.0, 1e-7);
+            let pushed = rest_push_forward(&rest, &ANISOTROPIC, x, delta, gravity);
+            assert_relative_eq!(dot(pushed, lambda), pulled, max_relative = 1e-10);
+            // A panel may be moved in its plane without changing anything.
+            assert!((hat[0] + hat[1] + hat[2]).norm() < 1e-9 * hat[1].norm());
+        }
+    }
+
+    #[test]
+    fn a_strip_in_uniaxial_stretch_pulls_as_the_closed_form_says() {
+        // Isotropic E·h = 1000, ν = 0: tension per width E·h·½(s² − 1)·s at stretch s.
+        let fabric = Fabric {
+            warp: 1000.0,
+            weft: 1000.0,
+            poisson: 0.0,
+            shear: 500.0,
+            ..Fabric::default()
+        };
+        let rest = RestTriangle::new([Vec2::zeros(), Vec2::new(1.0, 0.0), Vec2::new(0.0, 1.0)]);
+        let s = 1.2;
+        let x = [
+            Vec3::zeros(),
+            Vec3::new(s, 0.0, 0.0),
+            Vec3::new(0.0, 1.0, 0.0),
+        ];
+        let f = force(&rest, &Elasticity::from(&fabric), x);
+        // Corner 1 carries half the width of the unit square.
+        assert_relative_eq!(
+            f[1].x,
+            -0.5 * 1000.0 * 0.5 * (s * s - 1.0) * s,
+            max_relative = 1e-12
+        );
+    }
+}

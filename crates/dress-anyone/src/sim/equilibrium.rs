@@ -1,0 +1,244 @@
+//! The static solve: f(x, x̄) = 0 by projected Newton with pseudo-transient continuation.
+//!
+//! Every iteration solves (K + σM) d = f. σ \[1/s²\] starts high, which makes the step a damped,
+//! implicit fall, and goes to zero as the cloth settles, which makes it Newton's. Elements are
+//! clamped to positive semi-definite until the residual is small. Steps must lower the energy, so
+//! the path cannot end on a saddle that the exact stiffness shows.
+
+use super::energy::contact::Surface;
+use super::sparse::Factor;
+use super::system::System;
+use crate::geometry::Vec3;
+use serde::{Deserialize, Serialize};
+
+/// How to look for equilibrium.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct EquilibriumParams {
+    /// Residual ‖f‖/(‖m‖|g|) at which a drape counts as at rest \[–\]. The paper has none: it
+    /// stops after a number of steps.
+    pub tolerance: f64,
+    /// Residual to which the state is polished before it is differentiated \[–\].
+    pub polished: f64,
+    /// Largest number of factorisations.
+    pub iterations: usize,
+    /// Farthest any vertex moves in one iteration \[m\]. Higher is faster and may jump through
+    /// thin limbs.
+    pub step: f64,
+    /// First σ of a drape from placed panels \[1/s²\].
+    pub cold: f64,
+    /// First σ of a drape from a nearby one \[1/s²\].
+    pub warm: f64,
+}
+
+impl Default for EquilibriumParams {
+    fn default() -> Self {
+        Self {
+            tolerance: 1e-6,
+            polished: 1e-9,
+            iterations: 400,
+            step: 0.02,
+            cold: 1e3,
+            warm: 30.0,
+        }
+    }
+}
+
+/// How a search for equilibrium ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum RestStatus {
+    /// The residual is below the tolerance.
+    AtRest,
+    /// The largest number of iterations was reached.
+    IterationLimit,
+    /// The garment still moves as a whole: nothing holds it.
+    Sliding,
+    /// No step lowers the energy any more, though the residual is above the tolerance.
+    Stalled,
+    /// Positions or forces stopped being finite numbers.
+    NotFinite,
+    /// The caller asked to stop.
+    Stopped,
+}
+
+/// Where a search for equilibrium ended.
+#[derive(Clone, Debug)]
+pub struct Equilibrium {
+    /// Positions \[m\].
+    pub x: Vec<Vec3>,
+    /// ‖f‖/(‖m‖|g|).
+    pub residual: f64,
+    /// Factorisations used.
+    pub iterations: usize,
+    /// How it ended.
+    pub status: RestStatus,
+}
+
+/// Residual below which the exact stiffness is tried.
+const EXACT_BELOW: f64 = 0.1;
+/// Residual below which energy differences drown in round-off, and the residual itself must fall.
+const ROUND_OFF_BELOW: f64 = 1e-4;
+/// Iterations for which elements stay clamped after the exact stiffness proved indefinite.
+const CLAMPED_FOR: usize = 3;
+/// A garment whose centre moves this far \[m\] over [`SLIDE_WINDOW`] late iterations slides.
+const SLIDE: f64 = 0.01;
+/// Iterations over which sliding is judged.
+const SLIDE_WINDOW: usize = 10;
+/// Sliding is judged only after this many iterations.
+const SETTLED_AFTER: usize = 100;
+
+/// Finds the equilibrium near `x` to residual `tolerance`, starting with damping `sigma`.
+/// `observe` is told the iteration and the residual, and may ask to stop by returning `false`.
+pub fn find<S: Surface>(
+    system: &System<'_, S>,
+    mut x: Vec<Vec3>,
+    mut sigma: f64,
+    tolerance: f64,
+    params: &EquilibriumParams,
+    observe: &mut dyn FnMut(usize, f64) -> bool,
+) -> Equilibrium {
+    let mut energy = system.energy(&x);
+    let mut force = system.force(&x);
+    let mut residual = system.residual(&force);
+    let mut clamped_for = 0_usize;
+    let mut centres = vec![centre(&x)];
+    let mut status = RestStatus::IterationLimit;
+    let mut iterations = 0;
+    while iterations < params.iterations {
+        if !residual.is_finite() {
+            status = RestStatus::NotFinite;
+            break;
+        }
+        if residual < tolerance {
+            status = RestStatus::AtRest;
+            break;
+        }
+        if !observe(iterations, residual) {
+            status = RestStatus::Stopped;
+            break;
+        }
+        iterations += 1;
+        let exact = residual < EXACT_BELOW && clamped_for == 0;
+        clamped_for = clamped_for.saturating_sub(1);
+        let Some(factor) = damped_factor(system, &x, sigma, !exact) else {
+            // An exact stiffness may be indefinite; a clamped one only by round-off.
+            if exact {
+                clamped_for = CLAMPED_FOR;
+            } else {
+                sigma = 10.0 * sigma.max(1.0);
+            }
+            continue;
+        };
+        let mut direction = factor.solve(&force);
+        let farthest = direction.iter().map(Vec3::norm).fold(0.0, f64::max);
+        if !farthest.is_finite() {
+            status = RestStatus::NotFinite;
+            break;
+        }
+        let scale = (params.step / farthest).min(1.0);
+        for d in &mut direction {
+            *d *= scale;
+        }
+        let Some(step) = line_search(system, &x, &direction, energy, residual) else {
+            if sigma > 1e12 {
+                status = RestStatus::Stalled;
+                break;
+            }
+            sigma = 10.0 * sigma.max(1.0);
+            continue;
+        };
+        x = step.x;
+        force = step.force;
+        residual = step.residual;
+        energy = step.energy;
+        if step.fraction < 1.0 {
+            sigma *= 2.0;
+        } else if farthest < 10.0 * params.step {
+            sigma *= 0.3;
+            if sigma < 1e-3 && residual < 1e-2 {
+                sigma = 0.0;
+            }
+        }
+        centres.push(centre(&x));
+        if slides(&centres) {
+            status = RestStatus::Sliding;
+            break;
+        }
+    }
+    Equilibrium {
+        x,
+        residual,
+        iterations,
+        status,
+    }
+}
+
+/// Factor of K + σM; none when it is not positive definite.
+fn damped_factor<S: Surface>(
+    system: &System<'_, S>,
+    x: &[Vec3],
+    sigma: f64,
+    clamped: bool,
+) -> Option<Factor> {
+    let mut k = system.stiffness(x, clamped);
+    k.add_diagonal(sigma, &system.rest.mass);
+    k.factor()
+}
+
+/// An accepted step.
+struct Step {
+    x: Vec<Vec3>,
+    force: Vec<Vec3>,
+    residual: f64,
+    energy: f64,
+    fraction: f64,
+}
+
+/// The largest of a few fractions of `direction` that lowers the energy, or — near rest, where
+/// energies cannot tell — the residual.
+fn line_search<S: Surface>(
+    system: &System<'_, S>,
+    x: &[Vec3],
+    direction: &[Vec3],
+    energy: f64,
+    residual: f64,
+) -> Option<Step> {
+    for fraction in [1.0, 0.5, 0.25, 0.1, 0.03] {
+        let moved: Vec<Vec3> = x
+            .iter()
+            .zip(direction)
+            .map(|(p, d)| p + d * fraction)
+            .collect();
+        let new_energy = system.energy(&moved);
+        let lower = new_energy < energy;
+        let drowned = residual < ROUND_OFF_BELOW && new_energy <= energy + 1e-10 * energy.abs();
+        if !lower && !drowned {
+            continue;
+        }
+        let force = system.force(&moved);
+        let new_residual = system.residual(&force);
+        if drowned && new_residual >= residual {
+            continue;
+        }
+        return Some(Step {
+            x: moved,
+            force,
+            residual: new_residual,
+            energy: new_energy,
+            fraction,
+        });
+    }
+    None
+}
+
+/// Mean position.
+fn centre(x: &[Vec3]) -> Vec3 {
+    x.iter().sum::<Vec3>() / x.len() as f64
+}
+
+/// Whether the garment's centre keeps moving late in the search.
+fn slides(centres: &[Vec3]) -> bool {
+    let n = centres.len();
+    n > SETTLED_AFTER && (centres[n - 1] - centres[n - 1 - SLIDE_WINDOW]).norm() > SLIDE
+}

@@ -1,0 +1,247 @@
+//! One XPBD time step (paper §3.1; Macklin et al. 2016, with the velocity factor τ).
+//!
+//! x̃ = x + Δt v + Δt² g, then sweeps of (∇C M⁻¹ ∇Cᵀ + α̃) Δλ = −C − α̃λ over membrane, bending,
+//! contact and holds in a fixed order, then v ← τ (x − x_n)/Δt. It brings placed panels together;
+//! at usual sweep counts its rest state is centimetres too long (METHOD §1.5), so the static solve
+//! follows.
+
+use super::cloth::{Cloth, GRAVITY, Rest};
+use super::energy::contact::{ContactParams, Surface};
+use super::energy::membrane::{Elasticity, constraint};
+use crate::geometry::{Mat3, Vec3};
+use serde::{Deserialize, Serialize};
+
+/// How to step.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct StepParams {
+    /// Time step Δt \[s\]. DiffXPBD: 0.0016.
+    pub dt: f64,
+    /// Sweeps over all constraints per step. Fewer stretch more.
+    pub sweeps: usize,
+    /// Rate η at which velocity is lost \[1/s\]; τ = exp(−η Δt). The paper's τ = 0.95 at
+    /// Δt = 1/60 is 3.1.
+    pub drag: f64,
+    /// Fastest any vertex moves \[m/s\]: keeps cloth from passing through limbs.
+    pub speed: f64,
+    /// Simulated time \[s\] before the static solve takes over.
+    pub time: f64,
+}
+
+impl Default for StepParams {
+    fn default() -> Self {
+        Self {
+            dt: 1.0 / 120.0,
+            sweeps: 12,
+            drag: 3.1,
+            speed: 1.5,
+            time: 2.0,
+        }
+    }
+}
+
+/// Positions and velocities.
+#[derive(Clone, Debug)]
+pub struct State {
+    /// \[m\].
+    pub x: Vec<Vec3>,
+    /// \[m/s\].
+    pub v: Vec<Vec3>,
+}
+
+/// Steps a cloth with one rest shape on one body.
+pub struct Stepper<'a, S> {
+    cloth: &'a Cloth,
+    rest: &'a Rest,
+    surface: &'a S,
+    contact: ContactParams,
+    params: StepParams,
+    /// 𝔻⁻¹ Δt⁻²: compliance of the membrane per rest area.
+    compliance: Mat3,
+    /// 1/m.
+    w: Vec<f64>,
+    lambda_membrane: Vec<Vec3>,
+    lambda_bend: Vec<Vec3>,
+    lambda_hold: Vec<f64>,
+}
+
+/// A vertex near the body: its contact linearised once per step.
+struct Touch {
+    vertex: usize,
+    normal: Vec3,
+    /// c = normal·x − offset.
+    offset: f64,
+    alpha_tilde: f64,
+    lambda: f64,
+}
+
+impl<'a, S: Surface> Stepper<'a, S> {
+    /// Prepares to step.
+    pub fn new(
+        cloth: &'a Cloth,
+        rest: &'a Rest,
+        surface: &'a S,
+        contact: ContactParams,
+        params: StepParams,
+    ) -> Self {
+        Self {
+            compliance: inverse(&cloth.elasticity) / (params.dt * params.dt),
+            w: rest.mass.iter().map(|m| 1.0 / m).collect(),
+            lambda_membrane: vec![Vec3::zeros(); cloth.triangles.len()],
+            lambda_bend: vec![Vec3::zeros(); cloth.hinges.len()],
+            lambda_hold: vec![0.0; cloth.holds.len()],
+            cloth,
+            rest,
+            surface,
+            contact,
+            params,
+        }
+    }
+
+    /// Advances `state` by Δt.
+    pub fn step(&mut self, state: &mut State) {
+        let dt = self.params.dt;
+        let before = state.x.clone();
+        for (x, v) in state.x.iter_mut().zip(&state.v) {
+            *x += *v * dt + GRAVITY * (dt * dt);
+        }
+        self.lambda_membrane.fill(Vec3::zeros());
+        self.lambda_bend.fill(Vec3::zeros());
+        self.lambda_hold.fill(0.0);
+        let mut touching = self.touching(&state.x);
+        for _ in 0..self.params.sweeps {
+            self.sweep_membrane(&mut state.x);
+            self.sweep_bend(&mut state.x);
+            self.sweep_holds(&mut state.x);
+            self.sweep_contact(&mut touching, &mut state.x);
+        }
+        let tau = (-self.params.drag * dt).exp();
+        let farthest = self.params.speed * dt;
+        for ((x, v), start) in state.x.iter_mut().zip(&mut state.v).zip(&before) {
+            let moved = *x - start;
+            let length = moved.norm();
+            if length > farthest {
+                *x = start + moved * (farthest / length);
+            }
+            *v = (*x - start) * (tau / dt);
+        }
+    }
+
+    fn sweep_membrane(&mut self, x: &mut [Vec3]) {
+        for (e, t) in self.cloth.triangles.iter().enumerate() {
+            let corners = t.map(|a| x[a as usize]);
+            let w = t.map(|a| self.w[a as usize]);
+            let rest = &self.rest.triangles[e];
+            let (c, j) = constraint(rest, corners);
+            let alpha_tilde = self.compliance / rest.area;
+            let mut system = alpha_tilde;
+            for a in 0..3 {
+                system += j[a] * j[a].transpose() * w[a];
+            }
+            let lambda = &mut self.lambda_membrane[e];
+            let right = -c - alpha_tilde * *lambda;
+            let Some(delta) = solve_symmetric(&system, &right) else {
+                continue;
+            };
+            *lambda += delta;
+            for a in 0..3 {
+                x[t[a] as usize] += j[a].transpose() * delta * w[a];
+            }
+        }
+    }
+
+    fn sweep_bend(&mut self, x: &mut [Vec3]) {
+        let per_time = 1.0 / (self.params.dt * self.params.dt);
+        for (e, hinge) in self.cloth.hinges.iter().enumerate() {
+            let rest = &self.rest.hinges[e];
+            let alpha_tilde = per_time / rest.stiffness;
+            let c = rest.curvature_vector(hinge.vertices.map(|a| x[a as usize]));
+            let mut inverse_mass = alpha_tilde;
+            for (a, k) in hinge.vertices.iter().zip(rest.k) {
+                inverse_mass += self.w[*a as usize] * k * k;
+            }
+            let lambda = &mut self.lambda_bend[e];
+            let delta = -(c + *lambda * alpha_tilde) / inverse_mass;
+            *lambda += delta;
+            for (a, k) in hinge.vertices.iter().zip(rest.k) {
+                x[*a as usize] += delta * (self.w[*a as usize] * k);
+            }
+        }
+    }
+
+    fn sweep_holds(&mut self, x: &mut [Vec3]) {
+        let per_time = 1.0 / (self.params.dt * self.params.dt);
+        for (hold, lambda) in self.cloth.holds.iter().zip(&mut self.lambda_hold) {
+            let a = hold.vertex as usize;
+            let alpha_tilde = per_time / hold.stiffness;
+            let delta = -(x[a].y - hold.height + alpha_tilde * *lambda) / (self.w[a] + alpha_tilde);
+            *lambda += delta;
+            x[a].y += self.w[a] * delta;
+        }
+    }
+
+    fn sweep_contact(&self, touching: &mut [Touch], x: &mut [Vec3]) {
+        for touch in touching {
+            let w = self.w[touch.vertex];
+            let p = &mut x[touch.vertex];
+            let c = touch.normal.dot(p) - touch.offset;
+            let wanted =
+                touch.lambda + (-c - touch.alpha_tilde * touch.lambda) / (w + touch.alpha_tilde);
+            let delta = wanted.max(0.0) - touch.lambda;
+            touch.lambda += delta;
+            *p += touch.normal * (w * delta);
+        }
+    }
+
+    fn touching(&self, x: &[Vec3]) -> Vec<Touch> {
+        let per_time = 1.0 / (self.params.dt * self.params.dt);
+        let reach = self.contact.thickness + 2.0 * self.params.speed * self.params.dt;
+        let touch = |(vertex, p): (usize, &Vec3)| {
+            let (d, gradient) = self.surface.distance(*p).filter(|(d, _)| *d < reach)?;
+            let normal = gradient.try_normalize(1e-3)?;
+            let kappa = self.contact.stiffness * self.cloth.reference_area[vertex];
+            Some(Touch {
+                vertex,
+                normal,
+                offset: normal.dot(p) - (d - self.contact.thickness),
+                alpha_tilde: per_time / kappa,
+                lambda: 0.0,
+            })
+        };
+        x.iter().enumerate().filter_map(touch).collect()
+    }
+}
+
+/// 𝔻⁻¹ \[m/N\].
+fn inverse(d: &Elasticity) -> Mat3 {
+    let determinant = d.weft * d.warp - d.coupling * d.coupling;
+    Mat3::new(
+        d.warp / determinant,
+        -d.coupling / determinant,
+        0.0,
+        -d.coupling / determinant,
+        d.weft / determinant,
+        0.0,
+        0.0,
+        0.0,
+        1.0 / d.shear,
+    )
+}
+
+/// A x = b for symmetric positive definite 3×3 A, by LDLᵀ; none if a pivot is not positive.
+fn solve_symmetric(a: &Mat3, b: &Vec3) -> Option<Vec3> {
+    let d0 = a.m11;
+    let l10 = a.m21 / d0;
+    let l20 = a.m31 / d0;
+    let d1 = a.m22 - l10 * a.m21;
+    let l21 = (a.m32 - l20 * a.m21) / d1;
+    let d2 = a.m33 - l20 * a.m31 - l21 * (a.m32 - l20 * a.m21);
+    if !(d0 > 0.0 && d1 > 0.0 && d2 > 0.0) {
+        return None;
+    }
+    let y1 = b.y - l10 * b.x;
+    let y2 = b.z - l20 * b.x - l21 * y1;
+    let z = y2 / d2;
+    let y = y1 / d1 - l21 * z;
+    Some(Vec3::new(b.x / d0 - l10 * y - l20 * z, y, z))
+}

@@ -1,0 +1,236 @@
+//! The total energy U(x; x̄) of cloth on a body, its force and stiffness (METHOD §1.4: membrane,
+//! bending, contact, holds, weight), assembled from the pieces of [`super::energy`].
+
+use super::cloth::{Cloth, GRAVITY, Rest};
+use super::energy::contact::{self, ContactParams, Surface};
+use super::energy::membrane;
+use super::sparse::{BlockMatrix, Slot, Structure};
+use crate::geometry::Vec3;
+use std::sync::Arc;
+
+/// Where each element's blocks go in the stiffness matrix; the same for every x and x̄.
+#[derive(Clone, Debug)]
+pub struct Assembly {
+    structure: Arc<Structure>,
+    /// Lower-triangle block pairs of each triangle, in the order of [`PAIRS`]`[..6]`.
+    triangles: Vec<[Slot; 6]>,
+    /// Lower-triangle block pairs of each hinge, in the order of [`PAIRS`].
+    hinges: Vec<[Slot; 10]>,
+    vertices: Vec<Slot>,
+}
+
+/// (row, column) corners of the lower triangle of an element matrix.
+const PAIRS: [(usize, usize); 10] = [
+    (0, 0),
+    (1, 0),
+    (1, 1),
+    (2, 0),
+    (2, 1),
+    (2, 2),
+    (3, 0),
+    (3, 1),
+    (3, 2),
+    (3, 3),
+];
+
+impl Assembly {
+    /// Prepares the matrix structure of `cloth` and orders its elimination.
+    pub fn new(cloth: &Cloth) -> Self {
+        let triangles = cloth.triangles.iter().map(<[u32; 3]>::as_slice);
+        let hinges = cloth.hinges.iter().map(|h| h.vertices.as_slice());
+        let structure = Structure::new(cloth.vertex_count, triangles.chain(hinges));
+        let slot = |a: u32, b: u32| structure.slot(a.max(b), a.min(b));
+        Self {
+            triangles: cloth
+                .triangles
+                .iter()
+                .map(|t| std::array::from_fn(|p| slot(t[PAIRS[p].0], t[PAIRS[p].1])))
+                .collect(),
+            hinges: cloth
+                .hinges
+                .iter()
+                .map(|h| {
+                    std::array::from_fn(|p| slot(h.vertices[PAIRS[p].0], h.vertices[PAIRS[p].1]))
+                })
+                .collect(),
+            vertices: (0..cloth.vertex_count as u32).map(|v| slot(v, v)).collect(),
+            structure: Arc::new(structure),
+        }
+    }
+
+    /// Sparsity and elimination order.
+    pub fn structure(&self) -> &Structure {
+        &self.structure
+    }
+}
+
+/// Cloth with one rest shape on one body.
+pub struct System<'a, S> {
+    /// Topology and fabric.
+    pub cloth: &'a Cloth,
+    /// Where blocks go.
+    pub assembly: &'a Assembly,
+    /// What follows from x̄.
+    pub rest: &'a Rest,
+    /// The body.
+    pub surface: &'a S,
+    /// How cloth meets it.
+    pub contact: ContactParams,
+}
+
+impl<S: Surface> System<'_, S> {
+    /// U \[J\].
+    pub fn energy(&self, x: &[Vec3]) -> f64 {
+        let mut sum = 0.0;
+        for (rest, t) in self.rest.triangles.iter().zip(&self.cloth.triangles) {
+            sum += membrane::energy(rest, &self.cloth.elasticity, t.map(|a| x[a as usize]));
+        }
+        for (rest, hinge) in self.rest.hinges.iter().zip(&self.cloth.hinges) {
+            sum += rest.energy(hinge.vertices.map(|a| x[a as usize]));
+        }
+        for (a, p) in x.iter().enumerate() {
+            sum -= self.rest.mass[a] * GRAVITY.dot(p);
+            sum += contact::energy(self.surface, self.kappa(a), self.contact.thickness, *p);
+        }
+        for hold in &self.cloth.holds {
+            let off = x[hold.vertex as usize].y - hold.height;
+            sum += 0.5 * hold.stiffness * off * off;
+        }
+        sum
+    }
+
+    /// f = −∂U/∂x \[N\].
+    pub fn force(&self, x: &[Vec3]) -> Vec<Vec3> {
+        let mut f: Vec<Vec3> = self.rest.mass.iter().map(|m| GRAVITY * *m).collect();
+        for (rest, t) in self.rest.triangles.iter().zip(&self.cloth.triangles) {
+            let forces = membrane::force(rest, &self.cloth.elasticity, t.map(|a| x[a as usize]));
+            for (a, force) in t.iter().zip(forces) {
+                f[*a as usize] += force;
+            }
+        }
+        for (rest, hinge) in self.rest.hinges.iter().zip(&self.cloth.hinges) {
+            let forces = rest.force(hinge.vertices.map(|a| x[a as usize]));
+            for (a, force) in hinge.vertices.iter().zip(forces) {
+                f[*a as usize] += force;
+            }
+        }
+        for (a, p) in x.iter().enumerate() {
+            f[a] += contact::force(self.surface, self.kappa(a), self.contact.thickness, *p);
+        }
+        for hold in &self.cloth.holds {
+            let a = hold.vertex as usize;
+            f[a].y -= hold.stiffness * (x[a].y - hold.height);
+        }
+        f
+    }
+
+    /// K = ∂²U/∂x² \[N/m\]. `clamped` drops what can make an element indefinite: compressive
+    /// stress and contact curvature.
+    pub fn stiffness(&self, x: &[Vec3], clamped: bool) -> BlockMatrix {
+        let mut k = BlockMatrix::zeros(Arc::clone(&self.assembly.structure));
+        for (e, t) in self.cloth.triangles.iter().enumerate() {
+            let corners = t.map(|a| x[a as usize]);
+            let rest = &self.rest.triangles[e];
+            let blocks = membrane::stiffness(rest, &self.cloth.elasticity, corners, clamped);
+            for (slot, (i, j)) in self.assembly.triangles[e].iter().zip(PAIRS) {
+                if t[i] >= t[j] {
+                    k.add(*slot, &blocks[i][j]);
+                } else {
+                    k.add(*slot, &blocks[i][j].transpose());
+                }
+            }
+        }
+        for (e, hinge) in self.cloth.hinges.iter().enumerate() {
+            let rest = &self.rest.hinges[e];
+            for (slot, (i, j)) in self.assembly.hinges[e].iter().zip(PAIRS) {
+                let value = rest.stiffness * rest.k[i] * rest.k[j];
+                // The two corners opposite to a seam may be one vertex (the tip of a dart).
+                let twice = i != j && hinge.vertices[i] == hinge.vertices[j];
+                k.add_scalar(*slot, if twice { 2.0 * value } else { value });
+            }
+        }
+        for (a, p) in x.iter().enumerate() {
+            let h = self.contact.thickness;
+            if let Some(block) = contact::stiffness(self.surface, self.kappa(a), h, *p, clamped) {
+                k.add(self.assembly.vertices[a], &block);
+            }
+        }
+        for hold in &self.cloth.holds {
+            let block = crate::geometry::Mat3::from_diagonal(&Vec3::new(0.0, hold.stiffness, 0.0));
+            k.add(self.assembly.vertices[hold.vertex as usize], &block);
+        }
+        k
+    }
+
+    /// ‖f‖₂ / (‖m‖₂ |g|) \[–\].
+    pub fn residual(&self, force: &[Vec3]) -> f64 {
+        force.iter().map(Vec3::norm_squared).sum::<f64>().sqrt() / self.rest.weight()
+    }
+
+    /// Contact stiffness of vertex `a` \[N/m\].
+    pub fn kappa(&self, a: usize) -> f64 {
+        self.contact.stiffness * self.cloth.reference_area[a]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::check::{assert_derivative, noise};
+    use crate::garment::Fabric;
+    use crate::sim::cloth::{Hold, fixtures};
+    use crate::sim::energy::contact::fixtures::Cone;
+
+    #[test]
+    fn force_and_stiffness_are_derivatives_of_the_energy() {
+        let mesh = fixtures::tube(10, 4, 0.06);
+        let mut cloth = Cloth::new(&mesh, &Fabric::default());
+        cloth.holds.push(Hold {
+            vertex: 3,
+            height: 0.1,
+            stiffness: 40.0,
+        });
+        let rest = cloth.at_rest(&mesh.x_bar);
+        let assembly = Assembly::new(&cloth);
+        let surface = Cone {
+            radius: 0.09,
+            slope: 0.2,
+            flat: 1.1,
+            lean: 0.2,
+        };
+        let contact = ContactParams {
+            thickness: 0.02,
+            stiffness: 1e4,
+        };
+        let system = System {
+            cloth: &cloth,
+            assembly: &assembly,
+            rest: &rest,
+            surface: &surface,
+            contact,
+        };
+        let mut x = fixtures::rolled(&mesh, 0.6, 0.092);
+        for (i, p) in x.iter_mut().enumerate() {
+            *p += Vec3::from_fn(|c, _| 0.004 * noise(3 * i + c));
+        }
+        let d: Vec<Vec3> = (0..x.len())
+            .map(|i| Vec3::from_fn(|c, _| noise(900 + 3 * i + c)))
+            .collect();
+        let at = |s: f64| x.iter().zip(&d).map(|(p, d)| p + d * s).collect::<Vec<_>>();
+        let dot = |a: &[Vec3], b: &[Vec3]| a.iter().zip(b).map(|(a, b)| a.dot(b)).sum::<f64>();
+
+        let slope = -dot(&system.force(&x), &d);
+        assert_derivative(|s| system.energy(&at(s)), slope, 1e-6, 1e-3, 1e-6);
+        let kd = system.stiffness(&x, false).multiply(&d);
+        let q: Vec<Vec3> = (0..x.len())
+            .map(|i| Vec3::from_fn(|c, _| noise(70 + 5 * i + c)))
+            .collect();
+        assert_derivative(
+            |s| -dot(&system.force(&at(s)), &q),
+            dot(&kd, &q),
+            1e-6,
+            1e-3,
+            1e-6,
+        );
+    }
+}
