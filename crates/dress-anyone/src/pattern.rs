@@ -3,8 +3,14 @@
 //! A [`Pattern`] is what the pattern maker drew; [`mesh::PatternMesh`] is the same, meshed and sewn.
 //! Lengths are metres in each panel's own plane; y is up along the panel as placed.
 
+mod canonical;
 pub mod curve;
+mod interior;
 pub mod mesh;
+mod sew;
+#[cfg(test)]
+mod shared_garments;
+pub mod triangulate;
 
 use crate::geometry::{Mat3, Vec2, Vec3};
 pub use curve::Curve;
