@@ -1,5 +1,7 @@
 //! Meshes and the questions asked of them; knows nothing of garments or bodies.
 
+pub mod bvh;
+pub mod closest_point;
 pub mod mesh;
 
 /// A point or vector of the plane \[m\].
@@ -11,6 +13,7 @@ pub type Mat2 = nalgebra::Matrix2<f64>;
 /// 3×3 matrix.
 pub type Mat3 = nalgebra::Matrix3<f64>;
 
+pub use closest_point::{ClosestPoint, Foot};
 pub use mesh::TriangleMesh;
 
 /// `a × b` in the plane: twice the signed area of the triangle (0, a, b) \[m²\].
