@@ -3,6 +3,7 @@
 pub mod bvh;
 pub mod closest_point;
 pub mod mesh;
+pub mod watertight;
 
 /// A point or vector of the plane \[m\].
 pub type Vec2 = nalgebra::Vector2<f64>;
