@@ -1,6 +1,9 @@
 //! A body to dress: a triangle mesh in metres, y up, and how its file saw it.
 
+pub mod distance_field;
+
 use crate::geometry::{TriangleMesh, Vec3};
+pub use distance_field::DistanceField;
 use serde::Serialize;
 
 /// A body in SI units, y up.

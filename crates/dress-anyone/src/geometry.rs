@@ -1,8 +1,11 @@
 //! Meshes and the questions asked of them; knows nothing of garments or bodies.
 
+pub mod bvh;
+pub mod closest_point;
 pub mod mesh;
 pub mod polygon;
 pub mod quality;
+pub mod watertight;
 
 /// A point or vector of the plane \[m\].
 pub type Vec2 = nalgebra::Vector2<f64>;
@@ -13,6 +16,7 @@ pub type Mat2 = nalgebra::Matrix2<f64>;
 /// 3×3 matrix.
 pub type Mat3 = nalgebra::Matrix3<f64>;
 
+pub use closest_point::{ClosestPoint, Foot};
 pub use mesh::TriangleMesh;
 
 /// `a × b` in the plane: twice the signed area of the triangle (0, a, b) \[m²\].

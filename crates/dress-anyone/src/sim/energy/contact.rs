@@ -4,6 +4,7 @@
 //! The distance d comes from a [`Surface`] with a gradient and a Hessian, so force and stiffness
 //! are exact derivatives of the energy, contact curvature included.
 
+use crate::body::distance_field::DistanceField;
 use crate::geometry::{Mat3, Vec3};
 use serde::{Deserialize, Serialize};
 
@@ -13,6 +14,17 @@ pub trait Surface: Sync {
     fn distance(&self, p: Vec3) -> Option<(f64, Vec3)>;
     /// Hessian of the distance \[1/m\]; zero where nothing is near.
     fn curvature(&self, p: Vec3) -> Mat3;
+}
+
+impl Surface for DistanceField {
+    fn distance(&self, p: Vec3) -> Option<(f64, Vec3)> {
+        self.sample(p).map(|s| (s.distance, s.gradient))
+    }
+
+    fn curvature(&self, p: Vec3) -> Mat3 {
+        self.sample_with_hessian(p)
+            .map_or_else(Mat3::zeros, |(_, hessian)| hessian)
+    }
 }
 
 /// No body: cloth hangs free.
