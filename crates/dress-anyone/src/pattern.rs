@@ -5,6 +5,8 @@
 
 pub mod curve;
 pub mod mesh;
+pub mod outline;
+pub mod validate;
 
 use crate::geometry::{Mat3, Vec2, Vec3};
 pub use curve::Curve;
