@@ -11,6 +11,8 @@ mod sew;
 #[cfg(test)]
 mod shared_garments;
 pub mod triangulate;
+pub mod outline;
+pub mod validate;
 
 use crate::geometry::{Mat3, Vec2, Vec3};
 pub use curve::Curve;
