@@ -1,1 +1,3 @@
 //! Files. The only place that knows their units, axes and index bases; inside, all is SI and y up.
+
+pub mod svg;
