@@ -155,8 +155,8 @@ fn card(canvas: &mut Canvas, corner: [usize; 2], tile: [usize; 2]) {
         width: tile[0] as f32,
         height: tile[1] as f32,
     };
-    let shade = |t: f32| mix(hex(CARD[0]), hex(CARD[1]), t * t);
-    canvas.card(area, 7.0, shade);
+    let [light, dark] = CARD.map(hex);
+    canvas.card(area, 7.0, |t| mix(light, dark, t * t));
 }
 
 /// The caption of a column and, below it, what its distances amount to.
@@ -186,13 +186,13 @@ fn summary(scalar: &[f64]) -> String {
     )
 }
 
-/// Top of the colour scale \[m\]: the next of 1, 2, 5, 10, … mm above nearly all of `scalar`.
+/// Top of the colour scale \[m\]: the next round number of mm above nearly all of `scalar`.
 fn scale_top(scalar: &[f64]) -> f64 {
     let most = quantile(&sorted_finite(scalar), 0.98) * 1e3;
     let power = 10_f64.powf(most.max(1.0).log10().floor());
-    let steps = [1.0, 2.0, 5.0, 10.0].map(|step| step * power);
-    let top = steps.iter().find(|step| **step >= most);
-    top.unwrap_or(&steps[3]) * 1e-3
+    let mut steps = [1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0].into_iter();
+    let top = steps.find(|step| step * power >= most);
+    top.unwrap_or(10.0) * power * 1e-3
 }
 
 fn sorted_finite(values: &[f64]) -> Vec<f64> {

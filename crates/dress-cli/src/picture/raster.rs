@@ -105,7 +105,7 @@ impl Raster {
     }
 
     /// Lights what was drawn and lays it on the canvas at pixel (`left`, `top`).
-    /// `crevices` is the radius of the neighbourhood \[samples\]; `opacity` is by pixel row.
+    /// `crevices` is the radius of the neighbourhood \[px\]; `opacity` is by pixel row.
     pub fn develop(
         &self,
         canvas: &mut Canvas,
@@ -113,13 +113,14 @@ impl Raster {
         crevices: usize,
         opacity: impl Fn(usize) -> f32,
     ) {
+        let width = self.width / SAMPLES;
         let neighbourhood = self.mean_depth(crevices);
         for y in 0..self.height / SAMPLES {
-            for x in 0..self.width / SAMPLES {
+            for x in 0..width {
                 let (mut sum, mut covered) = ([0.0; 3], 0);
                 for sample in self.samples_of(x, y) {
                     if self.depth[sample].is_finite() {
-                        let lit = self.lit(sample, neighbourhood[sample]);
+                        let lit = self.lit(sample, neighbourhood[y * width + x]);
                         sum = [0, 1, 2].map(|i| sum[i] + lit[i]);
                         covered += 1;
                     }
@@ -153,25 +154,31 @@ impl Raster {
         let sheen = dot(n, half_way()).max(0.0).powi(24);
         let behind = ((neighbourhood - self.depth[sample]) / CREVICE).clamp(0.0, 1.0);
         let open = 1.0 - DARKENING * behind * (2.0 - behind);
-        let light = (0.30 * ambient + 0.72 * key + 0.16 * fill) * open;
+        let light = (0.24 * ambient + 0.80 * key + 0.15 * fill) * open;
         self.colour[sample].map(|channel| channel * light + 0.035 * sheen * open)
     }
 
-    /// Mean depth of the drawn samples in a square around each, by two sweeps of running sums.
+    /// Mean depth of what is drawn around each pixel, nearer pixels weighing more: two sweeps of
+    /// running sums each way, over about `radius` pixels.
     fn mean_depth(&self, radius: usize) -> Vec<f32> {
-        let drawn = |depth: &f32| {
-            if depth.is_finite() {
-                (f64::from(*depth), 1.0)
-            } else {
-                (0.0, 0.0)
+        let (width, height) = (self.width / SAMPLES, self.height / SAMPLES);
+        let mut sums = Vec::with_capacity(width * height);
+        for pixel in 0..width * height {
+            let mut sum = (0.0, 0.0);
+            for sample in self.samples_of(pixel % width, pixel / width) {
+                if self.depth[sample].is_finite() {
+                    sum = (sum.0 + f64::from(self.depth[sample]), sum.1 + 1.0);
+                }
             }
-        };
-        let mut sums: Vec<(f64, f64)> = self.depth.iter().map(drawn).collect();
-        for y in 0..self.height {
-            running_sums(&mut sums, y * self.width, 1, self.width, radius);
+            sums.push(sum);
         }
-        for x in 0..self.width {
-            running_sums(&mut sums, x, self.width, self.height, radius);
+        for _ in 0..2 {
+            for y in 0..height {
+                running_sums(&mut sums, y * width, 1, width, radius.div_ceil(2));
+            }
+            for x in 0..width {
+                running_sums(&mut sums, x, width, height, radius.div_ceil(2));
+            }
         }
         let mean = |(sum, count): (f64, f64)| (sum / count.max(1.0)) as f32;
         sums.into_iter().map(mean).collect()
@@ -281,10 +288,12 @@ mod tests {
 
     #[test]
     fn the_mean_depth_leaves_the_background_out() {
-        let mut raster = Raster::new(2, 1);
-        raster.depth[4] = 2.0;
-        raster.depth[5] = 4.0;
+        let mut raster = Raster::new(9, 1);
+        raster.depth[0] = 2.0;
+        raster.depth[4] = 4.0;
         let mean = raster.mean_depth(1);
-        assert_eq!((mean[4], mean[0]), (3.0, 0.0));
+        // Pixels 0 and 1 are drawn, by one sample each; pixel 8 has none of them near.
+        assert!(mean[0] > 2.0 && mean[0] < mean[1] && mean[1] < 4.0);
+        assert_eq!(mean[8], 0.0);
     }
 }

@@ -98,7 +98,7 @@ pub fn draw(
         let [a, b] = x(ends);
         raster.line(a, b, LINE * SAMPLES as f64, SLACK);
     }
-    let crevices = (CREVICE_RADIUS * eye.scale).ceil() as usize;
+    let crevices = (CREVICE_RADIUS * eye.scale / SAMPLES as f64).ceil() as usize;
     raster.develop(canvas, corner, crevices, |row| {
         fade(row, tile[1], frame.cut)
     });

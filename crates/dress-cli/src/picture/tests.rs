@@ -124,8 +124,14 @@ fn nothing_to_draw_and_nonsense_are_still_a_picture() {
 
 #[test]
 fn the_scale_ends_at_a_round_number_above_nearly_everything() {
-    // [m] and its top [m]: never below a millimetre, then 1, 2, 5, 10, …
-    for (value, top) in [(0.0, 1e-3), (1.5e-3, 2e-3), (0.021, 0.05), (0.2, 0.2)] {
+    // [m] and its top [m]: never below a millimetre.
+    for (value, top) in [
+        (0.0, 1e-3),
+        (1.6e-3, 2e-3),
+        (0.021, 0.03),
+        (0.2, 0.2),
+        (0.09, 0.1),
+    ] {
         assert!((scale_top(&[value; 9]) - top).abs() < 1e-12, "{value}");
     }
     assert_eq!(summary(&[]), "");
