@@ -4,3 +4,4 @@ pub mod file;
 pub mod garmentcode;
 pub mod json;
 pub mod output;
+pub mod svg;
