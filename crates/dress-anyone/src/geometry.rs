@@ -1,6 +1,7 @@
 //! Meshes and the questions asked of them; knows nothing of garments or bodies.
 
 pub mod mesh;
+pub mod polygon;
 
 /// A point or vector of the plane \[m\].
 pub type Vec2 = nalgebra::Vector2<f64>;

@@ -5,6 +5,7 @@
 
 pub mod curve;
 pub mod mesh;
+pub mod symmetry;
 
 use crate::geometry::{Mat3, Vec2, Vec3};
 pub use curve::Curve;
