@@ -152,6 +152,16 @@ impl Reflection {
         self.u * displacement.conj()
     }
 
+    /// Turns the plane so that the axis becomes the y axis, for a reflection that undoes itself.
+    pub fn upright(&self, p: Vec2) -> Vec2 {
+        point(Complex64::I * self.u.sqrt().conj() * (complex(p) - 0.5 * self.b))
+    }
+
+    /// Inverse of [`Self::upright`].
+    pub fn from_upright(&self, p: Vec2) -> Vec2 {
+        point(-Complex64::I * self.u.sqrt() * complex(p) + 0.5 * self.b)
+    }
+
     /// From the image back.
     #[must_use]
     pub fn inverse(&self) -> Self {
@@ -589,7 +599,7 @@ mod tests {
             panels: vec![left, right],
             stitches: vec![],
         };
-        let mut mesh = sampled(&pattern, 0.05);
+        let mut mesh = sampled(&pattern, 0.06);
         let mirror = Symmetry::detect(&pattern, &mesh, None).mirrors[0];
         let (first, second) = (
             mesh.panel_vertices[0].clone(),
