@@ -3,6 +3,7 @@
 pub mod bvh;
 pub mod closest_point;
 pub mod mesh;
+pub mod plane;
 pub mod polygon;
 pub mod quality;
 pub mod watertight;

@@ -7,11 +7,12 @@ mod canonical;
 pub mod curve;
 mod interior;
 pub mod mesh;
+pub mod outline;
 mod sew;
 #[cfg(test)]
 mod shared_garments;
+pub mod symmetry;
 pub mod triangulate;
-pub mod outline;
 pub mod validate;
 
 use crate::geometry::{Mat3, Vec2, Vec3};
