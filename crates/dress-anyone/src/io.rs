@@ -1,1 +1,7 @@
 //! Files. The only place that knows their units, axes and index bases; inside, all is SI and y up.
+
+pub mod body;
+pub mod obj;
+mod ply;
+mod source;
+mod stl;
