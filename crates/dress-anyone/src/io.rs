@@ -5,3 +5,8 @@ pub mod garmentcode;
 pub mod json;
 pub mod output;
 pub mod svg;
+pub mod body;
+pub mod obj;
+mod ply;
+mod source;
+mod stl;
