@@ -9,6 +9,7 @@ mod interior;
 pub mod mesh;
 mod sew;
 #[cfg(test)]
+#[allow(clippy::unwrap_used)]
 mod shared_garments;
 pub mod triangulate;
 
