@@ -10,6 +10,7 @@ pub mod mesh;
 pub mod outline;
 mod sew;
 #[cfg(test)]
+#[allow(clippy::unwrap_used)]
 mod shared_garments;
 pub mod symmetry;
 pub mod triangulate;

@@ -204,7 +204,9 @@ mod tests {
     #[test]
     fn a_point_on_a_shared_edge_belongs_to_one_of_two_squares() {
         let (left, mut shifted) = (Polygon::new(square()), square());
-        shifted.iter_mut().for_each(|p| p.x += 1.0);
+        for p in &mut shifted {
+            p.x += 1.0;
+        }
         let right = Polygon::new(shifted);
         for y in [0.0, 0.1, 0.3, 0.7] {
             let p = Vec2::new(1.0, y);

@@ -102,7 +102,7 @@ fn delaunay(points: &[Vec2], count: usize) -> Option<Vec<[u32; 3]>> {
     let mut conflicts = false;
     let mesh =
         ConstrainedDelaunayTriangulation::<Point2<f64>>::try_bulk_load_cdt(vertices, edges, |_| {
-            conflicts = true
+            conflicts = true;
         })
         .ok()?;
     if conflicts || mesh.num_vertices() < points.len() {
@@ -117,9 +117,7 @@ fn delaunay(points: &[Vec2], count: usize) -> Option<Vec<[u32; 3]>> {
         }
     }
     while let Some(edge) = front.pop() {
-        let Some(face) = edge.face().as_inner() else {
-            return None;
-        };
+        let face = edge.face().as_inner()?;
         if !std::mem::replace(&mut inside[face.index()], true) {
             let crossed = face.adjacent_edges().into_iter();
             front.extend(crossed.filter(|e| !e.is_constraint_edge()).map(|e| e.rev()));
@@ -182,7 +180,9 @@ impl Room {
             let fits = |p: &Vec2| self.polygon.contains(*p) && self.is_clear(*p);
             if let Some(p) = [centre, centroid].into_iter().find(fits) {
                 points.push(p);
-                triangle.iter().for_each(|&v| busy[v as usize] = true);
+                for &v in triangle {
+                    busy[v as usize] = true;
+                }
             }
         }
         points.len() - before

@@ -1,12 +1,14 @@
-//! Meshes every garment of the shared data and prints what came out. Test-only.
+//! Meshes the project's own garment and every one of the shared data. Test-only.
+//!
+//! The qualities reached are printed (`cargo test shared_garments -- --nocapture`).
 
 use super::curve::Curve;
 use super::triangulate::mesh;
 use super::{Edge, EdgeId, Panel, Pattern, PatternMesh, Placement, Stitch};
 use crate::geometry::quality::{QualitySummary, qualities};
-use crate::geometry::{Mat3, Vec2, Vec3};
+use crate::geometry::{TriangleMesh, Vec2, Vec3};
+use nalgebra::Rotation3;
 use serde_json::Value;
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// Every `.json` below the shared garments; none, with a word, where there are no shared data.
@@ -39,6 +41,7 @@ fn read(path: &Path) -> Option<Pattern> {
     let file: Value = serde_json::from_str(&std::fs::read_to_string(path).ok()?).ok()?;
     let scale = 1.0 / file["properties"]["units_in_meter"].as_f64()?;
     let vec2 = |v: &Value| Some(Vec2::new(v[0].as_f64()?, v[1].as_f64()?));
+    let vec3 = |v: &Value| Some(Vec3::new(v[0].as_f64()?, v[1].as_f64()?, v[2].as_f64()?));
     let panels = file["pattern"]["panels"].as_object()?;
     let read_panel = |(name, panel): (&String, &Value)| {
         let vertices: Vec<Vec2> = panel["vertices"]
@@ -83,8 +86,16 @@ fn read(path: &Path) -> Option<Pattern> {
                 .collect::<Option<_>>()?,
             vertices,
             placement: Placement {
-                rotation: Mat3::identity(),
-                translation: Vec3::zeros(),
+                rotation: {
+                    let [x, y, z] = vec3(&panel["rotation"])?.into();
+                    *Rotation3::from_euler_angles(
+                        f64::to_radians(x),
+                        f64::to_radians(y),
+                        f64::to_radians(z),
+                    )
+                    .matrix()
+                },
+                translation: vec3(&panel["translation"])? * scale,
             },
             label: None,
         })
@@ -114,18 +125,18 @@ fn read(path: &Path) -> Option<Pattern> {
 }
 
 /// Vertices − edges + faces, and how many triangles each edge has at most.
-fn topology(vertex_count: usize, triangles: &[[u32; 3]]) -> (i64, usize) {
-    let mut edges: BTreeMap<(u32, u32), usize> = BTreeMap::new();
-    for [a, b, c] in triangles {
-        for (u, v) in [(a, b), (b, c), (c, a)] {
-            *edges.entry((*u.min(v), *u.max(v))).or_default() += 1;
-        }
-    }
-    let most = edges.values().copied().max().unwrap_or(0);
-    (
-        vertex_count as i64 - edges.len() as i64 + triangles.len() as i64,
-        most,
-    )
+fn topology(vertex_count: usize, triangles: &[[u32; 3]]) -> (isize, usize) {
+    let mut edges: Vec<(u32, u32)> = triangles
+        .iter()
+        .flat_map(|&[a, b, c]| [(a, b), (b, c), (c, a)])
+        .map(|(u, v)| (u.min(v), u.max(v)))
+        .collect();
+    edges.sort_unstable();
+    let uses: Vec<usize> = edges.chunk_by(|a, b| a == b).map(<[_]>::len).collect();
+    let euler = (vertex_count + triangles.len())
+        .checked_signed_diff(uses.len())
+        .unwrap();
+    (euler, uses.into_iter().max().unwrap_or(0))
 }
 
 fn check(name: &str, pattern: &Pattern, mesh: &PatternMesh) -> QualitySummary {
@@ -183,31 +194,134 @@ fn every_shared_garment_welds_without_a_flipped_triangle() {
                 quality.one_percent,
                 quality.mean
             );
-            let qs = qualities(&mesh.x_bar, &mesh.triangles);
-            if quality.min < 0.4 {
-                let t = (0..qs.len())
-                    .min_by(|a, b| qs[*a].total_cmp(&qs[*b]))
-                    .unwrap();
-                let p = mesh
-                    .panel_triangles
-                    .iter()
-                    .position(|r| r.contains(&t))
-                    .unwrap();
-                let bound: Vec<bool> = mesh.triangles[t]
-                    .iter()
-                    .map(|v| mesh.edge_vertices[p].iter().flatten().any(|w| w == v))
-                    .collect();
-                println!(
-                    "   {} {:?} {:?}",
-                    pattern.panels[p].name,
-                    mesh.triangles[t]
-                        .map(|v| mesh.x_bar[v as usize] * 1000.0)
-                        .map(|p| (p.x, p.y)),
-                    bound
-                );
-            }
             all.extend(qualities(&mesh.x_bar, &mesh.triangles));
         }
         println!("{resolution} {:?}", QualitySummary::of(&all));
     }
+}
+
+/// A file of the project's own data.
+fn own(path: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("../../data")
+        .join(path)
+}
+
+#[test]
+fn the_embedded_t_shirt_has_four_openings_and_seams_of_equal_length() {
+    let pattern = read(&own("garments/tshirt.json")).unwrap();
+    let mesh = mesh(&pattern, 0.012).unwrap();
+    let quality = check("tshirt", &pattern, &mesh);
+    println!("{} vertices, {quality:?}", mesh.x_bar.len());
+    assert!(quality.min > 0.5 && quality.mean > 0.97, "{quality:?}");
+    // A sphere with four openings (neck, hem, two sleeves): 2 − 4, and edges have two sides.
+    let topology = topology(mesh.cloth_vertex_count, &mesh.cloth_triangles());
+    assert_eq!(topology, (-2, 2));
+    for stitch in &pattern.stitches {
+        let [a, b] = stitch.sides.map(|side| pattern.edge_length(side));
+        // The cap is 5 mm longer than its armhole in each half; all other seams are equal.
+        assert!((a - b).abs() < 1e-5 || ((b - a).abs() - 5e-3).abs() < 1e-5);
+    }
+}
+
+#[test]
+fn the_flat_t_shirt_surrounds_its_body_without_touching_it() {
+    let text = std::fs::read_to_string(own("bodies/f_average.obj")).unwrap();
+    let rows = |kind: &'static str| {
+        let lines = text.lines().filter_map(move |line| line.strip_prefix(kind));
+        lines.map(|line| {
+            line.split(' ')
+                .map(|n| n.parse::<f64>().unwrap())
+                .collect::<Vec<_>>()
+        })
+    };
+    let body = TriangleMesh {
+        positions: rows("v ").map(|v| Vec3::from_row_slice(&v)).collect(),
+        triangles: rows("f ")
+            .map(|f| [0, 1, 2].map(|k| f[k] as u32 - 1))
+            .collect(),
+    };
+    let pattern = read(&own("garments/tshirt.json")).unwrap();
+    let mesh = mesh(&pattern, 0.03).unwrap();
+    let garment = crate::garment::Garment {
+        name: "tshirt".into(),
+        pattern,
+        mesh,
+        drape: None,
+    };
+    let placed = garment.placed();
+    let nearest = |x: &Vec3| {
+        let distances = body.positions.iter().map(|p| (p - x).norm());
+        distances.fold(f64::INFINITY, f64::min)
+    };
+    let gap = placed.iter().map(nearest).fold(f64::INFINITY, f64::min);
+    // Body vertices are up to 2 cm apart, so that this is not far from the true distance.
+    assert!(gap > 0.008, "closest {gap} m");
+    let inside = placed
+        .iter()
+        .filter(|x| winding(**x, &body).abs() > 0.5)
+        .count();
+    assert_eq!(inside, 0);
+}
+
+/// How often a closed surface winds around `x` (van Oosterom & Strackee 1983).
+fn winding(x: Vec3, body: &TriangleMesh) -> f64 {
+    let solid_angle = |t: usize| {
+        let [a, b, c] = body.corners(t).map(|p| p - x);
+        let (l, m, n) = (a.norm(), b.norm(), c.norm());
+        let below = l * m * n + a.dot(&b) * n + b.dot(&c) * l + c.dot(&a) * m;
+        2.0 * a.dot(&b.cross(&c)).atan2(below)
+    };
+    (0..body.triangles.len()).map(solid_angle).sum::<f64>() / (4.0 * std::f64::consts::PI)
+}
+
+#[test]
+fn left_and_right_panels_of_shared_garments_mesh_as_mirror_images() {
+    let (mut pairs, mut alike) = (0, 0);
+    for file in shared_garments()
+        .iter()
+        .filter(|file| file.parent().unwrap().ends_with("named"))
+    {
+        let pattern = read(file).unwrap();
+        let mesh = mesh(&pattern, 0.015).unwrap();
+        let inner = |p: usize| {
+            let outline: usize = mesh.edge_vertices[p]
+                .iter()
+                .map(|along| along.len() - 1)
+                .sum();
+            mesh.x_bar[mesh.panel_vertices[p].clone()][outline..].to_vec()
+        };
+        for (left, panel) in pattern.panels.iter().enumerate() {
+            let mut mirrored: Vec<Vec2> = panel
+                .vertices
+                .iter()
+                .map(|p| Vec2::new(-p.x, p.y))
+                .collect();
+            let Some(right) = pattern.panel_named(&panel.name.replace("left", "right")) else {
+                continue;
+            };
+            let mut other = pattern.panels[right].vertices.clone();
+            let by_place = |a: &Vec2, b: &Vec2| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y));
+            mirrored.sort_by(by_place);
+            other.sort_by(by_place);
+            let twins = mirrored.len() == other.len()
+                && mirrored
+                    .iter()
+                    .zip(&other)
+                    .all(|(a, b)| (a - b).norm() < 1e-9);
+            if left == right || !twins {
+                continue;
+            }
+            pairs += 1;
+            let (a, b) = (inner(left), inner(right));
+            let same = |(a, b): (&Vec2, &Vec2)| (Vec2::new(-a.x, a.y) - b).norm() < 1e-9;
+            if a.len() == b.len() && a.iter().zip(&b).all(same) {
+                alike += 1;
+            } else {
+                println!("{} of {} differs from its twin", panel.name, file.display());
+            }
+        }
+    }
+    println!("{alike} of {pairs} pairs are mirror images");
+    assert_eq!(alike, pairs);
 }

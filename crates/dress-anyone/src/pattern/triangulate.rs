@@ -251,3 +251,7 @@ fn assemble(pattern: &Pattern, panels: Vec<PanelMesh>) -> PatternMesh {
     (mesh.sewing, mesh.cloth_vertex_count) = sew(pattern, &mesh.edge_vertices, mesh.x_bar.len());
     mesh
 }
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests;
