@@ -1,6 +1,7 @@
 //! Files. The only place that knows their units, axes and index bases; inside, all is SI and y up.
 
 pub mod body;
+pub mod garment_obj;
 pub mod obj;
 mod ply;
 mod source;
