@@ -5,6 +5,7 @@ pub mod distance_field;
 use crate::geometry::{TriangleMesh, Vec3};
 pub use distance_field::DistanceField;
 use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// A body in SI units, y up.
 #[derive(Clone, Debug, PartialEq)]
@@ -20,7 +21,7 @@ pub struct Body {
 }
 
 /// The axis that points up in a file.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum UpAxis {
     /// y up, the library's own.
@@ -30,7 +31,7 @@ pub enum UpAxis {
 }
 
 /// Unit and axes of a file. The library works in metres, y up.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FileFrame {
     /// Metres in one unit of the file.
     pub metres_per_unit: f64,

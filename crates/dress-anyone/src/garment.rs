@@ -1,8 +1,11 @@
 //! A garment: pattern, sewing, fabric, and — once it has one — its drape.
 
+mod summary;
+
 use crate::geometry::Vec3;
 use crate::pattern::{Pattern, PatternMesh};
 use serde::{Deserialize, Serialize};
+pub use summary::Summary;
 
 /// A pattern, meshed and sewn, with the drape its file brought, if any.
 #[derive(Clone, Debug, PartialEq)]

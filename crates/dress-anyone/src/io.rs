@@ -6,6 +6,7 @@ pub mod json;
 pub mod output;
 pub mod svg;
 pub mod body;
+pub mod garment_obj;
 pub mod obj;
 mod ply;
 mod source;

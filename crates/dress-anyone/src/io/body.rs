@@ -15,6 +15,7 @@ use crate::body::{Body, FileFrame, UpAxis};
 use crate::geometry::mesh::bounds;
 use crate::geometry::{TriangleMesh, Vec3};
 use crate::problem::{BadInput, Problem};
+use std::fmt::Write as _;
 use std::path::Path;
 
 /// What the user knows better than the guesses.
@@ -31,7 +32,7 @@ pub fn read(path: &Path, options: &BodyOptions) -> Result<Body, BadInput> {
     let bytes = source::bytes(path)?;
     let bad = |problems| BadInput::new(path, problems);
     let surface = surface_of(&bytes, path).map_err(bad)?;
-    let (mesh, frame, notes) = stand_up(surface, options).map_err(|p| bad(vec![p]))?;
+    let (mesh, frame, notes) = stand_up(&surface, options).map_err(|p| bad(vec![p]))?;
     Ok(Body {
         name: source::stem(path),
         mesh,
@@ -103,7 +104,7 @@ fn foreign(bytes: &[u8]) -> Option<&'static str> {
 
 /// Brings a surface to metres, y up, outside out; with notes on how.
 fn stand_up(
-    surface: Surface,
+    surface: &Surface,
     options: &BodyOptions,
 ) -> Result<(TriangleMesh, FileFrame, Vec<String>), Problem> {
     let mut notes = Vec::new();
@@ -178,7 +179,8 @@ fn metres_per_unit(
     };
     let mut note = format!("unit: {name} (the body is {:.3} m tall)", height * metres);
     for (other, name) in possible.iter().filter(|(other, _)| *other != metres) {
-        note += &format!("; it would be {:.2} m in {name}", height * other);
+        let height = height * other;
+        write!(note, "; it would be {height:.2} m in {name}").expect("a string takes all");
     }
     notes.push(note);
     Ok(metres)

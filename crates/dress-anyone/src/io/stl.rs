@@ -106,6 +106,7 @@ fn weld(corners: &[Vec3]) -> Surface {
 mod tests {
     use super::*;
     use proptest::prelude::*;
+    use std::fmt::Write as _;
 
     /// Two triangles of a unit square, once with −0 where the other has 0.
     const CORNERS: [[f32; 3]; 6] = [
@@ -134,7 +135,7 @@ mod tests {
         for triangle in CORNERS.chunks(3) {
             text += "facet normal 0 0 1\n outer loop\n";
             for [x, y, z] in triangle {
-                text += &format!("  vertex {x:e} {y} {z}\n");
+                writeln!(text, "  vertex {x:e} {y} {z}").unwrap();
             }
             text += " endloop\nendfacet\n";
         }

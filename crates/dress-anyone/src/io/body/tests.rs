@@ -49,7 +49,7 @@ fn every_unit_and_up_axis_is_recognised() {
                 up,
             };
             let (mesh, found, notes) =
-                stand_up(surface(&person(), frame), &BodyOptions::default()).unwrap();
+                stand_up(&surface(&person(), frame), &BodyOptions::default()).unwrap();
             assert_eq!(found, frame, "{notes:?}");
             for (p, q) in mesh.positions.iter().zip(&person().positions) {
                 assert!((p - q).norm() < 1e-12);
@@ -86,7 +86,7 @@ fn spread_arms_along_z_do_not_pass_for_the_height() {
                 ..surface(&turned, FileFrame::SI)
             },
         };
-        let (_, found, notes) = stand_up(seen, &BodyOptions::default()).unwrap();
+        let (_, found, notes) = stand_up(&seen, &BodyOptions::default()).unwrap();
         assert_eq!(found, frame, "{notes:?}");
     }
 }
@@ -99,7 +99,7 @@ fn inward_and_inconsistent_faces_are_turned_and_told() {
     }
     inward.triangles[5].swap(0, 1);
     let (mesh, _, notes) =
-        stand_up(surface(&inward, FileFrame::SI), &BodyOptions::default()).unwrap();
+        stand_up(&surface(&inward, FileFrame::SI), &BodyOptions::default()).unwrap();
     // Six boxes, each of its own volume; one triangle stood against its eleven neighbours.
     let all: Vec<usize> = (0..mesh.triangles.len()).collect();
     let volume: f64 = 0.4 * 0.65 * 0.22 + 0.04 * 0.25 + 2.0 * (0.16 * 0.8 * 0.25 + 0.6 * 0.01);
@@ -132,7 +132,7 @@ fn holes_components_and_unused_vertices_are_noted() {
     open.triangles.remove(0);
     open.positions.push(Vec3::new(100.0, 0.0, 0.0));
     let (mesh, _, notes) =
-        stand_up(surface(&open, FileFrame::SI), &BodyOptions::default()).unwrap();
+        stand_up(&surface(&open, FileFrame::SI), &BodyOptions::default()).unwrap();
     assert_eq!(mesh.positions.len(), open.positions.len());
     let notes = notes.join("\n");
     for expected in [
@@ -160,13 +160,13 @@ fn what_fits_no_unit_has_to_be_told() {
         up: UpAxis::Y,
     };
     let body = || surface(&person(), tiny);
-    let problem = stand_up(body(), &BodyOptions::default()).unwrap_err();
+    let problem = stand_up(&body(), &BodyOptions::default()).unwrap_err();
     assert!(problem.text.contains("0.0200 units tall"), "{problem}");
     let told = BodyOptions {
         metres_per_unit: Some(85.0),
         up: None,
     };
-    assert_eq!(stand_up(body(), &told).unwrap().1, tiny);
+    assert_eq!(stand_up(&body(), &told).unwrap().1, tiny);
 }
 
 #[test]
@@ -252,7 +252,7 @@ fn every_shared_body_stands_upright_in_metres() {
             up: UpAxis::Z,
         };
         let (mesh, found, _) =
-            stand_up(surface(&body.mesh, frame), &BodyOptions::default()).unwrap();
+            stand_up(&surface(&body.mesh, frame), &BodyOptions::default()).unwrap();
         assert_eq!(found, frame, "{}", body.name);
         assert_eq!(mesh.triangles, body.mesh.triangles);
     }
