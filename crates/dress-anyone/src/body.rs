@@ -4,7 +4,6 @@ pub mod distance_field;
 
 use crate::geometry::{TriangleMesh, Vec3};
 pub use distance_field::DistanceField;
-use serde::Serialize;
 use serde::{Deserialize, Serialize};
 
 /// A body in SI units, y up.

@@ -46,5 +46,6 @@ pub mod io;
 pub mod loss;
 pub mod pattern;
 pub mod problem;
+pub mod refit;
 pub mod sim;
 pub mod transfer;

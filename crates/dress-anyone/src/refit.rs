@@ -1,0 +1,3 @@
+//! The refit (paper §4).
+
+pub mod dress;
