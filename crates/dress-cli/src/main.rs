@@ -1,12 +1,10 @@
 //! The `dress` program.
 
-#![expect(
-    dead_code,
-    reason = "the commands that call these modules are not written yet"
-)]
 #![allow(
+    dead_code,
+    unused_imports,
     unreachable_pub,
-    reason = "modules of a program are written like a library's"
+    reason = "the commands that call these modules are not written yet"
 )]
 
 mod params;

@@ -194,7 +194,7 @@ fn read_obj(path: &std::path::Path) -> TriangleMesh {
     for line in std::fs::read_to_string(path).expect("a body").lines() {
         let words: Vec<&str> = line.split_whitespace().collect();
         let number = |i: usize| words[i].parse::<f64>().expect("a coordinate");
-        let index = |i: usize| words[i].split('/').next().map(|v| v.parse::<u32>());
+        let index = |i: usize| words[i].split('/').next().map(str::parse::<u32>);
         match words.first() {
             Some(&"v") => mesh
                 .positions
