@@ -168,7 +168,7 @@ fn caption(canvas: &mut Canvas, figure: &Figure, corner: [usize; 2], width: usiz
     }
 }
 
-/// "mean 3.1, 95 % below 8.0, largest 14.2 mm".
+/// "mean 3.1, 95% below 8.0, max 14.2 mm".
 fn summary(scalar: &[f64]) -> String {
     let sorted = sorted_finite(scalar);
     let Some(largest) = sorted.last() else {

@@ -214,7 +214,7 @@ fn draw_panel(svg: &mut String, sheet: &Sheet, page: &Page) {
 /// Font size that fits the name between the grain line and the outline \[mm\]; `room` is what is
 /// free to the right, `clearance` in every direction.
 fn name_size(name: &str, room: f64, clearance: f64) -> f64 {
-    // A letter of these faces is about 0.6 of its size wide; the note below has 9 letters more.
+    // A letter of these faces is about 0.6 of its size wide; the note below the name needs ten.
     let letters = name.chars().count().max(10) as f64;
     let fitting = (0.85 * room / (0.6 * letters)).min(0.6 * clearance);
     fitting.clamp(2.2, 11.0)

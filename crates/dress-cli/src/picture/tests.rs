@@ -2,7 +2,7 @@ use super::*;
 use dress_anyone::geometry::Vec2;
 use std::path::PathBuf;
 
-/// A cylinder about the vertical through the origin; cut open at the back where `open`.
+/// A rippled cylinder about the vertical through the origin, outward side in front.
 fn tube(radius: f64, low: f64, high: f64, around: u32, rows: u32) -> TriangleMesh {
     let mut mesh = TriangleMesh::default();
     for row in 0..=rows {
