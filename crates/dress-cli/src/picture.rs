@@ -117,11 +117,10 @@ pub fn preview(title: &str, figures: &[Figure], views: &[View]) -> Vec<u8> {
 
     let step = [tile[0] + GUTTER, tile[1] + GUTTER];
     let title_band = if title.is_empty() { 0 } else { TITLE_BAND };
-    let legend_band = if top_scale.is_some() { LEGEND_BAND } else { 0 };
     let first_row = MARGIN + title_band + CAPTION_BAND;
     let mut canvas = Canvas::new(
         2 * MARGIN + columns * step[0] - GUTTER,
-        first_row + (views.len() * step[1]).max(GUTTER) - GUTTER + legend_band + MARGIN,
+        first_row + (views.len() * step[1]).max(GUTTER) - GUTTER + LEGEND_BAND + MARGIN,
         hex(PAPER),
     );
     let room = (canvas.width - 2 * MARGIN) as f32;
@@ -139,11 +138,9 @@ pub fn preview(title: &str, figures: &[Figure], views: &[View]) -> Vec<u8> {
             text::write(&mut canvas, view.name(), at, 1.6, hex(GREY));
         }
     }
-    if let Some(top) = top_scale {
-        let from_bottom = MARGIN + LEGEND_BAND - 20;
-        let at = [MARGIN as f32 + 4.0, (canvas.height - from_bottom) as f32];
-        legend(&mut canvas, at, top);
-    }
+    let from_bottom = MARGIN + LEGEND_BAND - 20;
+    let at = [MARGIN as f32 + 4.0, (canvas.height - from_bottom) as f32];
+    legend(&mut canvas, at, top_scale);
     canvas.to_png()
 }
 
@@ -171,7 +168,7 @@ fn caption(canvas: &mut Canvas, figure: &Figure, corner: [usize; 2], width: usiz
     }
 }
 
-/// "mean 3.1, 95 % below 8.0, largest 14.2 mm".
+/// "mean 3.1, 95% below 8.0, max 14.2 mm".
 fn summary(scalar: &[f64]) -> String {
     let sorted = sorted_finite(scalar);
     let Some(largest) = sorted.last() else {
@@ -208,29 +205,41 @@ fn quantile(sorted: &[f64], share: f64) -> f64 {
     sorted.get(rank).copied().unwrap_or(0.0)
 }
 
-/// The colour scale with its ends and middle in millimetres, and what wrong sides look like.
-fn legend(canvas: &mut Canvas, [left, top]: [f32; 2], top_scale: f64) {
+/// The colour scale, if any, and what wrong sides look like.
+fn legend(canvas: &mut Canvas, [left, top]: [f32; 2], top_scale: Option<f64>) {
     const WIDTH: f32 = 300.0;
-    for i in 0..WIDTH as usize {
-        let x = left + i as f32 + 0.5;
-        let colour = colour::distance((i as f64 + 0.5) / f64::from(WIDTH));
-        canvas.stroke([x, top], [x, top + 12.0], 1.0, scaled(colour, 0.95));
-    }
-    for (share, more) in [(0.0, ""), (0.5, ""), (1.0, " mm or more")] {
-        let x = left + WIDTH * share;
-        canvas.stroke([x, top + 14.0], [x, top + 19.0], 1.2, hex(GREY));
-        let label = format!("{}{more}", tidy(f64::from(share) * top_scale * 1e3));
-        let number = text::width(label.trim_end_matches(more), 1.7);
-        let start = (x - 0.5 * number).max(left);
-        text::write(canvas, &label, [start, top + 34.0], 1.7, INK);
-    }
-    let x = left + WIDTH + 150.0;
+    const LABEL: f32 = 150.0;
+    let shift = if top_scale.is_some() {
+        WIDTH + LABEL
+    } else {
+        0.0
+    };
+    let swatch_at = [left + shift, top];
     swatch(
         canvas,
-        [x, top],
+        swatch_at,
         colour::WRONG_SIDE,
         "wrong side of the cloth",
     );
+    if let Some(top_scale) = top_scale {
+        scale_bar(canvas, [left, top], WIDTH, top_scale);
+    }
+}
+
+/// The colour scale with its ends and middle in millimetres.
+fn scale_bar(canvas: &mut Canvas, [left, top]: [f32; 2], width: f32, top_scale: f64) {
+    for i in 0..width as usize {
+        let x = left + i as f32 + 0.5;
+        let colour = colour::distance((i as f64 + 0.5) / f64::from(width));
+        canvas.stroke([x, top], [x, top + 12.0], 1.0, scaled(colour, 0.95));
+    }
+    for (share, more) in [(0.0, ""), (0.5, ""), (1.0, " mm or more")] {
+        let x = left + width * share;
+        canvas.stroke([x, top + 14.0], [x, top + 19.0], 1.2, hex(GREY));
+        let number = tidy(f64::from(share) * top_scale * 1e3);
+        let start = (x - 0.5 * text::width(&number, 1.7)).max(left);
+        text::write(canvas, &(number + more), [start, top + 34.0], 1.7, INK);
+    }
 }
 
 /// A colour and what it means.

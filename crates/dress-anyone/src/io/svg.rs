@@ -11,7 +11,7 @@ mod seams;
 use crate::geometry::{Vec2, signed_area};
 use crate::pattern::{Curve, Panel, Pattern};
 pub use layout::shelves;
-use layout::{box_around, heart};
+use layout::{box_around, heart, room_to_the_right};
 use seams::{Seam, Side, seams};
 use std::fmt::Write;
 
@@ -36,7 +36,7 @@ const STYLE: &str = "text{font-family:Helvetica,Arial,sans-serif;fill:#22262e}\
 .seam{fill:#fff;stroke:#2f6f9f;stroke-width:.45}\
 .odd{fill:#fff;stroke:#b3261e;stroke-width:.9;stroke-dasharray:1.6 1}\
 .number{font-size:4.6px;text-anchor:middle}\
-.note{font-size:5px;fill:#5b6675}";
+.note{fill:#5b6675}";
 
 /// Both patterns \[m\] in one drawing, panel over panel by name: `after` solid, `before` dashed.
 pub fn pattern_svg(before: &Pattern, after: &Pattern, title: &str) -> String {
@@ -139,7 +139,7 @@ impl Page {
             if e == 0 {
                 data = format!("M{}", point(a));
             }
-            data += &match edge.curve {
+            let piece = match edge.curve {
                 Curve::Line => format!(" L{}", point(b)),
                 Curve::Quadratic(c) => format!(" Q{} {}", point(c), point(b)),
                 Curve::Cubic([c, d]) => format!(" C{} {} {}", point(c), point(d), point(b)),
@@ -153,6 +153,7 @@ impl Page {
                     format!(" A{radius:.3} {radius:.3} 0 {large} {sweep} {}", point(b))
                 }
             };
+            data.push_str(&piece);
         }
         data + " Z"
     }
@@ -190,7 +191,8 @@ fn draw_panel(svg: &mut String, sheet: &Sheet, page: &Page) {
             down - tip,
         ),
     );
-    let size = name_size(&panel.name, clearance * MM);
+    let room = room_to_the_right(&outline, heart);
+    let size = name_size(&panel.name, room * MM, clearance * MM);
     let from_wrong = if signed_area(&outline) < 0.0 {
         "wrong side up"
     } else {
@@ -209,10 +211,12 @@ fn draw_panel(svg: &mut String, sheet: &Sheet, page: &Page) {
     );
 }
 
-/// Font size that fits the name into the panel's clear half width \[mm\].
-fn name_size(name: &str, clearance: f64) -> f64 {
-    // A letter of these faces is about 0.55 of its size wide.
-    let fitting = 0.95 * clearance / (0.55 * name.chars().count().max(13) as f64);
+/// Font size that fits the name between the grain line and the outline \[mm\]; `room` is what is
+/// free to the right, `clearance` in every direction.
+fn name_size(name: &str, room: f64, clearance: f64) -> f64 {
+    // A letter of these faces is about 0.6 of its size wide; the note below the name needs ten.
+    let letters = name.chars().count().max(10) as f64;
+    let fitting = (0.85 * room / (0.6 * letters)).min(0.6 * clearance);
     fitting.clamp(2.2, 11.0)
 }
 
@@ -260,7 +264,7 @@ fn draw_footer(svg: &mut String, top: f64, odd: bool) {
         svg,
         &format!(
             "<rect class=\"grain\" x=\"{GAP}\" y=\"{top:.3}\" width=\"{TEST_SQUARE}\" height=\"{TEST_SQUARE}\"/>\
-             <text class=\"note\" x=\"{:.3}\" y=\"{:.3}\">{TEST_SQUARE} mm square: measure it after printing</text>",
+             <text class=\"note\" font-size=\"5\" x=\"{:.3}\" y=\"{:.3}\">{TEST_SQUARE} mm</text>",
             GAP + 3.0,
             top + TEST_SQUARE - 3.5,
         ),
@@ -268,7 +272,7 @@ fn draw_footer(svg: &mut String, top: f64, odd: bool) {
     let mut lines = vec![
         "dashed: before, solid: after; scale 1:1, mm",
         "equal numbers are sewn together; arrows: grain line",
-        "no seam allowance",
+        "no seam allowance; measure the square after printing",
     ];
     if odd {
         lines.push("red, dashed number: right side is sewn to wrong side");
@@ -277,7 +281,9 @@ fn draw_footer(svg: &mut String, top: f64, odd: bool) {
         let y = top + 6.0 + 8.0 * i as f64;
         append(
             svg,
-            &format!("<text class=\"note\" x=\"{right}\" y=\"{y:.3}\">{line}</text>"),
+            &format!(
+                "<text class=\"note\" font-size=\"5\" x=\"{right}\" y=\"{y:.3}\">{line}</text>"
+            ),
         );
     }
 }

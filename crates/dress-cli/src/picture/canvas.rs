@@ -30,12 +30,9 @@ impl Canvas {
     }
 
     /// Lays `colour` over the pixel with this opacity; outside the canvas nothing happens.
-    pub fn blend(&mut self, x: i64, y: i64, colour: Rgb, opacity: f32) {
-        if let (Ok(column), Ok(row)) = (usize::try_from(x), usize::try_from(y))
-            && column < self.width
-            && row < self.height
-        {
-            let pixel = &mut self.pixels[row * self.width + column];
+    pub fn blend(&mut self, x: usize, y: usize, colour: Rgb, opacity: f32) {
+        if x < self.width && y < self.height {
+            let pixel = &mut self.pixels[y * self.width + x];
             *pixel = mix(*pixel, colour, opacity.clamp(0.0, 1.0));
         }
     }
@@ -102,8 +99,8 @@ impl Canvas {
             return;
         }
         let range = |i: usize, size: usize| {
-            let low = (middle[i] - reach[i] - 1.0).floor().max(0.0) as i64;
-            let high = (middle[i] + reach[i] + 1.0).ceil().min(size as f32) as i64;
+            let low = (middle[i] - reach[i] - 1.0).floor().max(0.0) as usize;
+            let high = (middle[i] + reach[i] + 1.0).ceil().clamp(0.0, size as f32) as usize;
             low..high
         };
         for y in range(1, self.height) {

@@ -128,8 +128,7 @@ impl Raster {
                 if covered > 0 {
                     let mean = sum.map(|channel| channel / covered as f32);
                     let share = covered as f32 / (SAMPLES * SAMPLES) as f32;
-                    let at = [(left + x) as i64, (top + y) as i64];
-                    canvas.blend(at[0], at[1], mean, share * opacity(y));
+                    canvas.blend(left + x, top + y, mean, share * opacity(y));
                 }
             }
         }

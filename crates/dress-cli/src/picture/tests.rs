@@ -2,7 +2,7 @@ use super::*;
 use dress_anyone::geometry::Vec2;
 use std::path::PathBuf;
 
-/// A cylinder about the vertical through the origin; cut open at the back where `open`.
+/// A rippled cylinder about the vertical through the origin, outward side in front.
 fn tube(radius: f64, low: f64, high: f64, around: u32, rows: u32) -> TriangleMesh {
     let mut mesh = TriangleMesh::default();
     for row in 0..=rows {
@@ -194,7 +194,7 @@ fn read_obj(path: &std::path::Path) -> TriangleMesh {
     for line in std::fs::read_to_string(path).expect("a body").lines() {
         let words: Vec<&str> = line.split_whitespace().collect();
         let number = |i: usize| words[i].parse::<f64>().expect("a coordinate");
-        let index = |i: usize| words[i].split('/').next().map(|v| v.parse::<u32>());
+        let index = |i: usize| words[i].split('/').next().map(str::parse::<u32>);
         match words.first() {
             Some(&"v") => mesh
                 .positions

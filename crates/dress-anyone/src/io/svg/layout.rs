@@ -3,20 +3,28 @@
 use crate::geometry::Vec2;
 
 /// Puts boxes of these sizes onto a sheet in rows, `gap` apart: the tallest first, rows filled from
-/// the left. Gives each box's corner of least coordinates, and the size of the sheet; in the unit of
-/// `sizes`, the first row at the least y.
+/// the left, the rows of the length that makes the sheet's longer side shortest. Gives each box's
+/// corner of least coordinates, and the size of the sheet; in the unit of `sizes`, the first row at
+/// the least y.
 pub fn shelves(sizes: &[Vec2], gap: f64) -> (Vec<Vec2>, Vec2) {
+    const TRIALS: u32 = 60;
     let mut order: Vec<usize> = (0..sizes.len()).collect();
     order.sort_by(|&a, &b| sizes[b].y.total_cmp(&sizes[a].y));
-    let area: f64 = sizes.iter().map(|s| (s.x + gap) * (s.y + gap)).sum();
     let widest = sizes.iter().map(|s| s.x).fold(0.0, f64::max);
-    // Rows are never quite filled: a sheet somewhat wider than the square of the same area.
-    let room = widest.max((1.5 * area).sqrt());
+    let all: f64 = sizes.iter().map(|s| s.x + gap).sum();
+    let room = |i: u32| widest + (all - widest) * f64::from(i) / f64::from(TRIALS);
+    (0..=TRIALS)
+        .map(|i| rows(sizes, &order, gap, room(i)))
+        .min_by(|(_, a), (_, b)| a.max().total_cmp(&b.max()))
+        .unwrap_or_default()
+}
 
+/// [`shelves`] with rows at most `room` long.
+fn rows(sizes: &[Vec2], order: &[usize], gap: f64, room: f64) -> (Vec<Vec2>, Vec2) {
     let mut corners = vec![Vec2::zeros(); sizes.len()];
     let (mut x, mut y, mut row_height) = (0.0, 0.0, 0.0_f64);
     let mut used = Vec2::zeros();
-    for b in order {
+    for &b in order {
         if x > 0.0 && x + sizes[b].x > room {
             (x, y, row_height) = (0.0, y + row_height + gap, 0.0);
         }
@@ -48,7 +56,8 @@ pub(super) fn heart(polygon: &[Vec2]) -> (Vec2, f64) {
         let p = low + cell.component_mul(&(high - low)) / CELLS as f64;
         if contains(polygon, p) {
             let distance = distance_to_outline(polygon, p);
-            if distance > best.1 {
+            // Of many as good, the leftmost: rounding does not choose.
+            if distance > 1.001 * best.1 {
                 best = (p, distance);
             }
         }
@@ -56,13 +65,23 @@ pub(super) fn heart(polygon: &[Vec2]) -> (Vec2, f64) {
     best
 }
 
+/// Distance from `p` to the outline straight to the right; 0 when nothing is there.
+pub(super) fn room_to_the_right(polygon: &[Vec2], p: Vec2) -> f64 {
+    let first = crossings(polygon, p).fold(f64::INFINITY, f64::min);
+    if first.is_finite() { first - p.x } else { 0.0 }
+}
+
 /// Whether a ray from `p` to the right crosses the outline an odd number of times.
 fn contains(polygon: &[Vec2], p: Vec2) -> bool {
-    let crossings = sides(polygon).filter(|(a, b)| {
-        let spans = (a.y > p.y) != (b.y > p.y);
-        spans && p.x < a.x + (p.y - a.y) / (b.y - a.y) * (b.x - a.x)
-    });
-    crossings.count() % 2 == 1
+    crossings(polygon, p).count() % 2 == 1
+}
+
+/// Where the ray from `p` to the right crosses the outline: x.
+fn crossings(polygon: &[Vec2], p: Vec2) -> impl Iterator<Item = f64> {
+    sides(polygon)
+        .filter(move |(a, b)| (a.y > p.y) != (b.y > p.y))
+        .map(move |(a, b)| a.x + (p.y - a.y) / (b.y - a.y) * (b.x - a.x))
+        .filter(move |x| *x > p.x)
 }
 
 fn distance_to_outline(polygon: &[Vec2], p: Vec2) -> f64 {

@@ -107,7 +107,7 @@ fn before_lies_centred_on_after() {
     let svg = pattern_svg(&before, &alone(moved), "t");
     let centre = |class: &str| {
         let p = numbers(path_of(&svg, class));
-        [(p[0] + p[4]) / 2.0, (p[1] + p[5]) / 2.0]
+        [f64::midpoint(p[0], p[4]), f64::midpoint(p[1], p[5])]
     };
     let (a, b) = (centre("after"), centre("before"));
     assert!((a[0] - b[0]).abs() < 2e-3 && (a[1] - b[1]).abs() < 2e-3);
