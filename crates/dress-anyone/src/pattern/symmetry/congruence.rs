@@ -13,8 +13,9 @@ use num_complex::Complex64;
 
 /// Samples of an outline; 128 find every shift, the rest is refined continuously.
 const SAMPLES: usize = 128;
-/// Outlines further apart than this part of their perimeter (rms) are different shapes: mirrored
-/// pairs measure below 0.05 %, the nearest different ones above 1 %.
+/// Outlines further apart than this part of their perimeter (rms) are different shapes. In 56
+/// GarmentCode designs mirrored outlines are within 3e-7; different ones in mirrored places start at
+/// 5e-3. The room between is for digitised patterns.
 pub(super) const SHAPE_TOLERANCE: f64 = 3e-3;
 
 /// An outline, and the affine map that places its plane in space.
