@@ -3,15 +3,17 @@
 //! `x̄ = x̄₀ + W (ζ − ζ₀)` with one constant real matrix W: Green coordinates are linear in the control
 //! points. They are conformal, so they cannot widen a panel without lengthening it; by default each
 //! panel gets one more complex unknown β that adds `β·conj(z − z_c)`, a uniform stretch and shear
-//! (docs: deviations). Symmetry is in the unknowns: of a mirror pair only the first panel has any, the
+//!. Symmetry is in the unknowns: of a mirror pair only the first panel has any, the
 //! second moves as its mirror image, so that no step can break it.
 
 mod control;
 pub mod enclose;
 #[cfg(test)]
+#[allow(clippy::unwrap_used)]
 pub(crate) mod fixture;
 pub mod green;
 #[cfg(test)]
+#[allow(clippy::unwrap_used)]
 mod tests;
 
 use crate::geometry::Vec2;
@@ -28,7 +30,8 @@ use std::ops::Range;
 #[derive(Clone, Debug)]
 pub struct Cages {
     x_bar: Vec<Vec2>,
-    cages: Vec<Cage>,
+    /// One for each panel or mirror pair.
+    each: Vec<Cage>,
     /// Unknowns before each cage, and all of them.
     offsets: Vec<usize>,
     /// `[panel]`.
@@ -164,7 +167,7 @@ impl Cages {
         }));
         Ok(Self {
             x_bar: mesh.x_bar.clone(),
-            cages,
+            each: cages,
             offsets,
             wearers: wearers.into_iter().flatten().collect(),
             least_stretch: params.least_stretch,
@@ -173,7 +176,7 @@ impl Cages {
 
     /// Number of real unknowns.
     pub fn unknown_count(&self) -> usize {
-        self.offsets[self.cages.len()]
+        self.offsets[self.each.len()]
     }
 
     /// ζ₀, the unknowns of the input pattern \[m\]: coordinates of control points, and β times the
@@ -208,7 +211,7 @@ impl Cages {
     /// ζ̂ = Wᵀ x̄̂: the gradient by the unknowns, given the gradient by the rest shape.
     pub fn pull_back(&self, x_bar_hat: &[Vec2]) -> Vec<f64> {
         let none = |cage: &Cage| vec![Complex64::ZERO; cage.handle_count()];
-        let mut hats: Vec<_> = self.cages.iter().map(none).collect();
+        let mut hats: Vec<_> = self.each.iter().map(none).collect();
         for wearer in &self.wearers {
             for (v, weights) in wearer.vertices.clone().zip(&wearer.weights) {
                 let hat = wearer.turn(complex(x_bar_hat[v]));
@@ -217,14 +220,14 @@ impl Cages {
                 }
             }
         }
-        let pulled = self.cages.iter().zip(&hats);
+        let pulled = self.each.iter().zip(&hats);
         pulled.flat_map(|(cage, hat)| cage.pull_back(hat)).collect()
     }
 
     /// Column `j` of W: ∂x̄/∂ζ_j \[–\] by pattern vertex, of the panels that unknown moves.
     pub fn column(&self, j: usize) -> Vec<(u32, Vec2)> {
         let c = self.offsets.partition_point(|first| *first <= j) - 1;
-        let moved = &self.cages[c].unknowns[j - self.offsets[c]];
+        let moved = &self.each[c].unknowns[j - self.offsets[c]];
         let by = |weights: &Vec<Complex64>| moved.iter().map(|(h, d)| weights[*h] * d).sum();
         let wearers = self.wearers.iter().filter(|wearer| wearer.cage == c);
         wearers
@@ -246,7 +249,7 @@ impl Cages {
                 .collect();
             betas
         };
-        self.cages
+        self.each
             .iter()
             .zip(&self.offsets)
             .flat_map(affine)
@@ -259,7 +262,7 @@ impl Cages {
     pub fn rigid_modes(&self, zeta: &[f64]) -> Vec<Vec<f64>> {
         let handles = self.handles(zeta);
         let mut modes = Vec::new();
-        for (c, cage) in self.cages.iter().enumerate() {
+        for (c, cage) in self.each.iter().enumerate() {
             for motion in cage.rigid_motions(&handles[c]) {
                 let own: Vec<f64> = cage.unknowns_of(&motion).collect();
                 let length = own.iter().map(|x| x * x).sum::<f64>().sqrt();
@@ -281,7 +284,7 @@ impl Cages {
         }
         let handles = self.handles(zeta);
         for (panel, wearer) in self.wearers.iter().enumerate() {
-            let cage = &self.cages[wearer.cage];
+            let cage = &self.each[wearer.cage];
             let fault = cage.fault(&handles[wearer.cage], self.least_stretch);
             match fault {
                 Some(Fault::CageCrosses) => return Err(Rejection::CageCrosses { panel }),
@@ -297,7 +300,7 @@ impl Cages {
     pub fn control_points(&self, zeta: &[f64]) -> Vec<Vec<Vec2>> {
         let handles = self.handles(zeta);
         let polygon = |wearer: &Wearer| {
-            let own = self.cages[wearer.cage].polygon(&handles[wearer.cage]);
+            let own = self.each[wearer.cage].polygon(&handles[wearer.cage]);
             match wearer.reflection {
                 Some(reflection) => own.iter().map(|p| reflection.apply(*p)).collect(),
                 None => own,
@@ -316,13 +319,13 @@ impl Cages {
             .collect();
         let of =
             |(c, cage): (usize, &Cage)| cage.handles(&change[self.offsets[c]..self.offsets[c + 1]]);
-        self.cages.iter().enumerate().map(of).collect()
+        self.each.iter().enumerate().map(of).collect()
     }
 
     /// All unknowns, given the handles of each cage.
     fn unknowns(&self, handles: impl Fn(&Cage) -> Vec<Complex64>) -> Vec<f64> {
         let of = |cage: &Cage| cage.unknowns_of(&handles(cage)).collect::<Vec<_>>();
-        self.cages.iter().flat_map(of).collect()
+        self.each.iter().flat_map(of).collect()
     }
 }
 

@@ -48,9 +48,9 @@ pub fn enclose(
             };
             let ring = drawing.contour()?;
             let cage = if mirrored {
-                unfold(&drawing.thin(right_half(ring)?))
+                unfold(&drawing.thin(&right_half(ring)?))
             } else {
-                let mut thinned = drawing.thin(from_farthest(ring));
+                let mut thinned = drawing.thin(&from_farthest(ring));
                 thinned.pop();
                 thinned
             };
@@ -90,13 +90,13 @@ impl Drawing {
     }
 
     /// Few points of the `chain`, among them its ends.
-    fn thin(&self, chain: Vec<Vec2>) -> Vec<Vec2> {
+    fn thin(&self, chain: &[Vec2]) -> Vec<Vec2> {
         let last = chain.len() - 1;
         let mut spans = if self.fold == 2 {
-            vec![self.span(&chain, 0, last)]
+            vec![self.span(chain, 0, last)]
         } else {
-            let far = farthest(&chain, chain[0]);
-            vec![self.span(&chain, 0, far), self.span(&chain, far, last)]
+            let far = farthest(chain, chain[0]);
+            vec![self.span(chain, 0, far), self.span(chain, far, last)]
         };
         loop {
             let count = spans.len() * self.fold;
@@ -111,8 +111,8 @@ impl Drawing {
                 break;
             }
             let Span { from, to, cut, .. } = spans[worst];
-            spans[worst] = self.span(&chain, from, cut);
-            spans.insert(worst + 1, self.span(&chain, cut, to));
+            spans[worst] = self.span(chain, from, cut);
+            spans.insert(worst + 1, self.span(chain, cut, to));
         }
         let starts = spans.iter().map(|span| chain[span.from]);
         starts.chain([chain[last]]).collect()
@@ -120,7 +120,7 @@ impl Drawing {
 
     fn span(&self, chain: &[Vec2], from: usize, to: usize) -> Span {
         let side = (chain[from], chain[to]);
-        let (mut cut, mut deviation) = ((from + to) / 2, 0.0);
+        let (mut cut, mut deviation) = (usize::midpoint(from, to), 0.0);
         for i in from + 1..to {
             let d = distance_to_segment(chain[i], side);
             if d > deviation {
@@ -128,7 +128,7 @@ impl Drawing {
             }
         }
         if deviation < self.delta / 4.0 {
-            cut = (from + to) / 2;
+            cut = usize::midpoint(from, to);
         }
         let near = self.clearance(side) < CLEARANCE * self.delta;
         let length = (side.1 - side.0).norm();
@@ -400,7 +400,7 @@ mod tests {
         let right = polygon(&[(0.2, 0.), (0.25, 0.3), (0.3, 0.5), (0.2, 0.5), (0.1, 0.4)]);
         let left = right.iter().rev().map(|p| Vec2::new(-p.x, p.y));
         let outline: Vec<_> = right.iter().copied().chain(left).collect();
-        let cage = enclose(&[outline.clone()], 12, 0.3, true).expect("encloses");
+        let cage = enclose(std::slice::from_ref(&outline), 12, 0.3, true).expect("encloses");
         let n = cage.len();
         assert_eq!((cage[0].x, cage[n / 2].x), (0.0, 0.0));
         for j in 1..n {

@@ -364,28 +364,3 @@ fn garmentcode_designs_deform_symmetrically_and_can_be_cut() {
         }
     }
 }
-
-/// Writes cages and outlines of all designs as JSON to the file named by DRESS_CAGES, to look at.
-#[test]
-#[ignore = "draws pictures"]
-fn dump() {
-    let mut all = serde_json::Map::new();
-    for (name, pattern) in patterns() {
-        let mesh = sampled(&pattern, 0.02);
-        let symmetry = Symmetry::detect(&pattern, &mesh, None);
-        let cages =
-            Cages::enclose(&pattern, &mesh, Some(&symmetry), &CageParams::default()).unwrap();
-        let zeta = shaken(&cages, 0.02);
-        let moved = cages.deform(&zeta);
-        let drawn = cages.control_points(&cages.rest_unknowns());
-        let drawn2 = cages.control_points(&zeta);
-        let pts = |p: &[Vec2]| p.iter().map(|p| vec![p.x, p.y]).collect::<Vec<_>>();
-        let panels: Vec<_> = (0..drawn.len()).map(|p| serde_json::json!({
-            "name": pattern.panels[p].name, "outline": pts(&pattern.panels[p].outline(0.01)), "cage": pts(&drawn[p]),
-            "cage2": pts(&drawn2[p]), "x2": pts(&moved[mesh.panel_vertices[p].clone()]), "n": pattern.panels[p].outline(0.02).len()})).collect();
-        all.insert(name, panels.into());
-    }
-    if let Some(f) = std::env::var_os("DRESS_CAGES") {
-        std::fs::write(f, serde_json::to_string(&all).unwrap()).unwrap();
-    }
-}
