@@ -2,7 +2,7 @@
 //!
 //! Such a file has two numberings, `v` for the sewn cloth and `vt` for the flat pattern. Panels are
 //! the islands of the second, seams are where the first joins what the second keeps apart. Unit and
-//! size of the pattern are measured against the drape, unless the file is one that [`write`] made:
+//! size of the pattern are measured against the drape, unless the file is one that [`write()`] made:
 //! its comments say what OBJ cannot hold.
 
 mod border;

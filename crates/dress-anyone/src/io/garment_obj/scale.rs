@@ -70,19 +70,14 @@ pub(super) fn find(
         .collect();
     check_uniform(&all, &common, &panels, islands, notes)?;
     let measured = common.median * frame.metres_per_unit;
-    let unit = UNITS
-        .iter()
-        .find(|(unit, _)| (measured / unit - 1.0).abs() < SNAP);
     // Coordinates packed into the unit square may span about a metre by chance.
     let packed = document
         .uvs
         .iter()
         .all(|uv| uv.min() >= 0.0 && uv.max() <= 1.0);
-    let scale = match unit {
-        Some((1.0, _)) | None if packed || unit.is_none() => measured,
-        Some((unit, _)) => *unit,
-        None => measured,
-    };
+    let is_near = |unit: &f64| (measured / unit - 1.0).abs() < SNAP && !(packed && *unit == 1.0);
+    let mut units = UNITS.iter().map(|(unit, _)| *unit);
+    let scale = units.find(is_near).unwrap_or(measured);
     notes.push(format!("texture scale: {scale:.5} m per unit"));
     Ok((frame, scale))
 }

@@ -20,6 +20,9 @@ use serde::{Deserialize, Serialize};
 /// What all tag lines start with.
 pub(super) const MARK: &str = "dress: ";
 
+/// No layout moves a panel by more than this \[m\].
+const FARTHEST: f64 = 1e4;
+
 /// All tags of a file.
 pub(super) struct Tags {
     frame: FileFrame,
@@ -126,6 +129,10 @@ impl Tags {
 
     fn pattern(self, islands: &Islands, border: &Border, garment: &Garment) -> Option<Restored> {
         if self.panels.len() != islands.names.len() {
+            return None;
+        }
+        let misplaced = |tag: &PanelTag| tag.offset.amax() > FARTHEST;
+        if self.panels.iter().any(misplaced) {
             return None;
         }
         let mut x_bar = garment.mesh.x_bar.clone();

@@ -1,5 +1,6 @@
 use super::*;
 use crate::pattern::{Curve, Edge, EdgeId, Panel, Stitch};
+use proptest::prelude::*;
 
 const COLUMNS: usize = 8;
 const ROWS: usize = 12;
@@ -367,6 +368,49 @@ fn textures_that_are_no_pattern_are_refused_with_the_reason() {
     let tetrahedron = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nvt 0 0\nvt 1 0\nvt 0 1\n\
         f 1/1 3/2 2/3\nf 1/1 2/2 4/3\nf 2/1 3/2 4/3\nf 3/1 1/2 4/3\n";
     assert!(refusal(tetrahedron, &guess).contains("closed"));
+}
+
+proptest! {
+    #[test]
+    fn faces_strewn_at_random_never_panic(
+        points in proptest::collection::vec((-2_i8..3, -2_i8..3, -2_i8..3), 5),
+        corners in proptest::collection::vec((0_u32..5, 0_u32..6), 3..24),
+        scale in proptest::option::of(0.1..2.0),
+    ) {
+        let position = |p: &(i8, i8, i8)| Vec3::new(p.0.into(), p.1.into(), p.2.into());
+        let corner = |(v, vt): &(u32, u32)| obj::Corner { v: *v, vt: Some(*vt) };
+        let document = obj::Document {
+            positions: points.iter().map(position).collect(),
+            uvs: [(0, 0), (2, 0), (2, 2), (0, 2), (1, 1), (3, 1)]
+                .map(|(u, v)| Vec2::new(f64::from(u), f64::from(v)))
+                .to_vec(),
+            faces: corners
+                .chunks_exact(3)
+                .map(|face| obj::Face {
+                    corners: face.iter().map(corner).collect(),
+                    object: None,
+                    group: None,
+                    line: 1,
+                })
+                .collect(),
+            ..obj::Document::default()
+        };
+        let options = UvOptions { uv_scale: scale, ..UvOptions::default() };
+        if let Ok(read) = assemble(document, String::new(), &options) {
+            // What is accepted keeps the promises of its types.
+            let (pattern, mesh) = (&read.garment.pattern, &read.garment.mesh);
+            prop_assert!((0..mesh.triangles.len()).all(|t| mesh.rest_area(t, &mesh.x_bar) > 0.0));
+            for stitch in &pattern.stitches {
+                let cloth = |id| mesh.along(id).iter().map(|v| mesh.sewing[*v as usize]);
+                let [a, b] = stitch.sides;
+                let mut b: Vec<u32> = cloth(b).collect();
+                if !stitch.right_wrong {
+                    b.reverse();
+                }
+                prop_assert_eq!(cloth(a).collect::<Vec<_>>(), b);
+            }
+        }
+    }
 }
 
 /// A real file next to the repository, or where `DRESS_SHARED` points; none elsewhere.
