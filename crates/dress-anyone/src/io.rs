@@ -3,4 +3,5 @@
 pub mod file;
 pub mod garmentcode;
 pub mod json;
+pub mod kind;
 pub mod output;
