@@ -6,6 +6,7 @@ pub mod garment_obj;
 pub mod garmentcode;
 pub mod json;
 pub mod obj;
+pub mod kind;
 pub mod output;
 mod ply;
 mod source;

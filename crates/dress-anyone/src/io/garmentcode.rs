@@ -9,7 +9,6 @@ mod read;
 mod write;
 
 use super::file::{MEBIBYTE, read_capped};
-use crate::geometry::Vec2;
 use crate::pattern::Pattern;
 use crate::problem::BadInput;
 use serde::{Deserialize, Serialize};
@@ -60,20 +59,7 @@ pub fn read(path: &Path, options: &ReadOptions) -> Result<Specification, BadInpu
 
 /// The specification in `bytes`; `file` is for messages only.
 pub fn parse(file: &Path, bytes: &[u8], options: &ReadOptions) -> Result<Specification, BadInput> {
-    read::parse(file, bytes, options)
-}
-
-/// A point given relative to the edge from `a` to `b`, in the plane; in any unit.
-fn from_relative(c: Vec2, a: Vec2, b: Vec2) -> Vec2 {
-    let along = b - a;
-    a + along * c.x + Vec2::new(-along.y, along.x) * c.y
-}
-
-/// Inverse of [`from_relative`]; `a` and `b` must differ.
-fn to_relative(p: Vec2, a: Vec2, b: Vec2) -> Vec2 {
-    let (along, offset) = (b - a, p - a);
-    let left = Vec2::new(-along.y, along.x);
-    Vec2::new(offset.dot(&along), offset.dot(&left)) / along.norm_squared()
+    read::parse(file, bytes, *options)
 }
 
 #[cfg(test)]

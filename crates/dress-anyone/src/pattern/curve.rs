@@ -205,6 +205,20 @@ impl Curve {
     }
 }
 
+/// The point that lies at `c` of the edge from `a` to `b`: (0, 0) is `a`, (1, 0) is `b`, and the
+/// second coordinate runs to the left of the edge, in lengths of the chord.
+pub fn from_edge(c: Vec2, a: Vec2, b: Vec2) -> Vec2 {
+    let along = b - a;
+    a + along * c.x + Vec2::new(-along.y, along.x) * c.y
+}
+
+/// Inverse of [`from_edge`]; `a` and `b` must differ.
+pub fn relative_to_edge(p: Vec2, a: Vec2, b: Vec2) -> Vec2 {
+    let (along, offset) = (b - a, p - a);
+    let left = Vec2::new(-along.y, along.x);
+    Vec2::new(offset.dot(&along), offset.dot(&left)) / along.norm_squared()
+}
+
 /// An arc by its centre; angles in radians, positive counter-clockwise.
 struct CentredArc {
     centre: Vec2,

@@ -122,8 +122,8 @@ fn loop_problems(panel: &Panel) -> Vec<Problem> {
 fn length_problems(panel: &Panel) -> Vec<Problem> {
     let short = |e: &usize| {
         let (a, b) = panel.ends(*e);
-        // Written so that a position that is not a number is caught as well.
-        !((b - a).norm() > SAME_POINT)
+        let chord = (b - a).norm();
+        chord.is_nan() || chord <= SAME_POINT
     };
     (0..panel.edges.len())
         .filter(short)

@@ -1,10 +1,14 @@
 //! From the document to a [`Pattern`]. Everything wrong is gathered before giving up: a part that
 //! cannot be read is replaced by a stand-in, so that the parts that lean on it can still be judged.
 
-use super::{ReadOptions, RotationOrder, Specification, from_relative};
+mod edge;
+mod value;
+
+use self::value::{index, label, numbers, show};
+use super::{ReadOptions, RotationOrder, Specification};
 use crate::geometry::{Mat3, Vec2, Vec3};
-use crate::io::json;
-use crate::pattern::{Curve, Edge, EdgeId, Panel, Pattern, Placement, Stitch, validate};
+use crate::io::{json, kind};
+use crate::pattern::{EdgeId, Panel, Pattern, Placement, Stitch, validate};
 use crate::problem::{BadInput, Problem};
 use nalgebra::Rotation3;
 use serde_json::Value;
@@ -23,13 +27,13 @@ const LISTED: usize = 100;
 pub(super) fn parse(
     file: &Path,
     bytes: &[u8],
-    options: &ReadOptions,
+    options: ReadOptions,
 ) -> Result<Specification, BadInput> {
     let document = match json::parse(file, bytes) {
         Ok(document) => document,
         Err(error) => return Err(other_kind(file, bytes).unwrap_or(error)),
     };
-    let mut reader = Reader::new(*options);
+    let mut reader = Reader::new(options);
     let pattern = reader.document(&document);
     if reader.problems.is_empty() {
         Ok(Specification {
@@ -45,32 +49,10 @@ pub(super) fn parse(
 
 /// A message naming what kind of file this is, when it is recognisably not JSON.
 fn other_kind(file: &Path, bytes: &[u8]) -> Option<BadInput> {
-    let text = bytes.trim_ascii_start();
-    let lines = || text.split(|&b| b == b'\n').take(200);
-    let obj_line = |line: &[u8]| {
-        [&b"v "[..], b"vt ", b"f ", b"mtllib "]
-            .iter()
-            .any(|tag| line.starts_with(tag))
-    };
-    let signatures: [(&[u8], &str); 9] = [
-        (b"ply", "a PLY mesh"),
-        (b"solid", "an STL mesh"),
-        (b"glTF", "a glTF scene"),
-        (b"Kaydara", "an FBX scene"),
-        (b"<", "an SVG or other XML file"),
-        (b"%PDF", "a PDF document"),
-        (b"\x89PNG", "a picture"),
-        (b"\xff\xd8", "a picture"),
-        (b"PK\x03\x04", "a zip archive; unpack it first"),
-    ];
-    let kind = signatures
-        .iter()
-        .find(|(signature, _)| text.starts_with(signature))
-        .map(|(_, kind)| *kind)
-        .or_else(|| lines().any(obj_line).then_some("an OBJ mesh"))?;
     let text = format!(
-        "this looks like {kind}; a garment is a GarmentCode pattern (*_specification.json). \
-         Were garment and body swapped?"
+        "this looks like {}; a garment is a GarmentCode pattern (*_specification.json). \
+         Were garment and body swapped?",
+        kind::of(bytes).filter(|kind| *kind != "a JSON document")?
     );
     Some(BadInput::one(file, Problem::whole(text)))
 }
@@ -165,7 +147,7 @@ impl Reader {
         let place = format!("panel `{name}`");
         let known_problems = self.problems.len();
         let vertices = self.vertices(&place, value.get("vertices"));
-        let mut panel = Panel {
+        let panel = Panel {
             name: name.to_owned(),
             edges: self.edges(&place, value.get("edges"), &vertices),
             vertices,
@@ -176,7 +158,6 @@ impl Reader {
             self.problems.extend(validate::panel_problems(&panel));
             self.note_unused_corners(&panel);
         }
-        panel.vertices.shrink_to_fit();
         panel
     }
 
@@ -245,132 +226,6 @@ impl Reader {
             rotation: rotation(degrees, self.options.rotation),
             translation,
         }
-    }
-
-    fn edges(&mut self, place: &str, value: Option<&Value>, vertices: &[Vec2]) -> Vec<Edge> {
-        let Some(list) = value.and_then(Value::as_array) else {
-            self.report(place, "has no list of `edges`");
-            return Vec::new();
-        };
-        let edge = |(e, value)| self.edge(&format!("{place}, edge {e}"), value, vertices);
-        list.iter().enumerate().map(edge).collect()
-    }
-
-    fn edge(&mut self, place: &str, value: &Value, vertices: &[Vec2]) -> Edge {
-        let ends = value.get("endpoints").and_then(indices);
-        if ends.is_none() {
-            self.report(
-                place,
-                "has no `endpoints`: two numbers of vertices, counted from 0",
-            );
-        }
-        let [start, end] = ends.unwrap_or([0, 0]);
-        let curvature = value.get("curvature").filter(|c| !c.is_null());
-        let curve = match (curvature, vertices.get(start), vertices.get(end)) {
-            (Some(curvature), Some(&a), Some(&b)) => self.curve(place, curvature, a, b),
-            // An end that does not exist is reported with the loop.
-            _ => Curve::Line,
-        };
-        Edge {
-            start,
-            end,
-            curve,
-            label: label(value),
-        }
-    }
-
-    fn curve(&mut self, place: &str, curvature: &Value, a: Vec2, b: Vec2) -> Curve {
-        let kind = curvature.get("type").and_then(Value::as_str);
-        let params = curvature.get("params");
-        let curve = match kind {
-            // Files of 2021 give the control point alone.
-            None if curvature.is_array() => self
-                .control_point(curvature, a, b)
-                .map(Curve::Quadratic)
-                .ok_or("`curvature` must be one control point, [x, y]"),
-            Some("quadratic") => self
-                .control_points(params, a, b)
-                .map(|[c]| Curve::Quadratic(c))
-                .ok_or("a quadratic curve has one control point: `params` is [[x, y]]"),
-            Some("cubic") => self
-                .control_points(params, a, b)
-                .map(Curve::Cubic)
-                .ok_or("a cubic curve has two control points: `params` is [[x, y], [x, y]]"),
-            Some("circle") => self.arc(params).ok_or(
-                "an arc has a radius above zero and two flags, each 0 or 1: `params` is \
-                 [radius, large, right]",
-            ),
-            _ => Err("the type of a curve is \"quadratic\", \"cubic\" or \"circle\""),
-        };
-        match curve {
-            Ok(curve) => {
-                self.check_reach(place, &curve);
-                curve
-            }
-            Err(rule) => {
-                self.report(place, format!("{rule}; found {}", show(curvature)));
-                Curve::Line
-            }
-        }
-    }
-
-    fn check_reach(&mut self, place: &str, curve: &Curve) {
-        let controls = match *curve {
-            Curve::Line => vec![],
-            Curve::Quadratic(c) => vec![c],
-            Curve::Cubic(controls) => controls.to_vec(),
-            Curve::Arc { radius, large, .. } => {
-                let most = if large { FARTHEST } else { LARGEST_RADIUS };
-                if radius > most {
-                    self.report(
-                        place,
-                        format!("has a radius of {radius:.0} m; make it a straight edge"),
-                    );
-                }
-                vec![]
-            }
-        };
-        for c in controls {
-            if c.amax() > FARTHEST {
-                self.too_far(place, "a control point", c.amax());
-            }
-        }
-    }
-
-    fn control_points<const N: usize>(
-        &self,
-        params: Option<&Value>,
-        a: Vec2,
-        b: Vec2,
-    ) -> Option<[Vec2; N]> {
-        let list: &[Value; N] = params?.as_array()?.as_slice().try_into().ok()?;
-        let mut points = [Vec2::zeros(); N];
-        for (point, value) in points.iter_mut().zip(list) {
-            *point = self.control_point(value, a, b)?;
-        }
-        Some(points)
-    }
-
-    fn control_point(&self, value: &Value, a: Vec2, b: Vec2) -> Option<Vec2> {
-        let given = Vec2::from(numbers::<2>(value)?);
-        Some(if self.absolute {
-            given / self.units_in_meter
-        } else {
-            from_relative(given, a, b)
-        })
-    }
-
-    fn arc(&self, params: Option<&Value>) -> Option<Curve> {
-        let [radius, large, right] = params?.as_array()?.as_slice() else {
-            return None;
-        };
-        let radius = radius.as_f64()? / self.units_in_meter;
-        (radius > 0.0).then_some(())?;
-        Some(Curve::Arc {
-            radius,
-            large: flag(large)?,
-            counter_clockwise: flag(right)?,
-        })
     }
 
     fn stitches(&mut self, value: Option<&Value>, pattern: &mut Pattern) {
@@ -476,48 +331,5 @@ fn rotation(degrees: Vec3, order: RotationOrder) -> Mat3 {
     match order {
         RotationOrder::Extrinsic => z * y * x,
         RotationOrder::Intrinsic => x * y * z,
-    }
-}
-
-fn numbers<const N: usize>(value: &Value) -> Option<[f64; N]> {
-    let list: &[Value; N] = value.as_array()?.as_slice().try_into().ok()?;
-    let mut numbers = [0.0; N];
-    for (number, value) in numbers.iter_mut().zip(list) {
-        *number = value.as_f64()?;
-    }
-    Some(numbers)
-}
-
-fn indices(value: &Value) -> Option<[usize; 2]> {
-    let [one, other] = value.as_array()?.as_slice() else {
-        return None;
-    };
-    Some([index(one)?, index(other)?])
-}
-
-fn index(value: &Value) -> Option<usize> {
-    usize::try_from(value.as_u64()?).ok()
-}
-
-/// `0`, `1`, `false` or `true`.
-fn flag(value: &Value) -> Option<bool> {
-    match value.as_f64() {
-        Some(0.0) => Some(false),
-        Some(1.0) => Some(true),
-        _ => value.as_bool(),
-    }
-}
-
-fn label(value: &Value) -> Option<String> {
-    let label = value.get("label")?.as_str()?;
-    (!label.is_empty()).then(|| label.to_owned())
-}
-
-/// The beginning of a value, for a message.
-fn show(value: &Value) -> String {
-    let text = value.to_string();
-    match text.char_indices().nth(60) {
-        Some((end, _)) => format!("{}…", &text[..end]),
-        None => text,
     }
 }

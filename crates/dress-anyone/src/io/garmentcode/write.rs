@@ -1,9 +1,9 @@
 //! From a [`Pattern`] to a document: the one it was read from with new vertices and curvatures, or a
 //! fresh one in centimetres.
 
-use super::{Specification, to_relative};
+use super::Specification;
 use crate::geometry::{Mat3, Vec2, Vec3};
-use crate::pattern::{Curve, Edge, EdgeId, Panel, Pattern, Placement, Stitch};
+use crate::pattern::{Curve, Edge, EdgeId, Panel, Pattern, Placement, Stitch, curve};
 use serde_json::{Map, Value, json};
 
 /// File units in a metre of a fresh document: centimetres, as GarmentCode writes.
@@ -131,7 +131,7 @@ impl Format {
             if self.absolute {
                 self.point(c)
             } else {
-                json!(to_relative(c, a, b).as_slice())
+                json!(curve::relative_to_edge(c, a, b).as_slice())
             }
         };
         let bare = written["curvature"].is_array();
