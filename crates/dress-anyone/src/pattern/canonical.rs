@@ -4,7 +4,7 @@
 //! So that a left and a right sleeve get exact mirror images, an outline is meshed from its most
 //! distinctive corner, seen from the more distinctive side, with coordinates rounded to nanometres.
 
-use crate::geometry::{Vec2, cross2, signed_area};
+use crate::geometry::{Vec2, Vec3, cross2, signed_area};
 use std::f64::consts::PI;
 
 /// Rounding of canonical coordinates \[m\] and angles \[rad\]. Not a round number: designers' lengths
@@ -24,25 +24,29 @@ pub(super) struct Canonical {
 }
 
 impl Canonical {
-    /// The canonical form of the simple polygon `outline`, in either direction.
-    pub(super) fn of(outline: &[Vec2]) -> Self {
+    /// The canonical form of the simple polygon `outline`, in either direction. Where a symmetric
+    /// outline looks the same from several points, `placed`, its points in space \[m\], decide so
+    /// that panels placed as mirror images (by x) are seen as such.
+    pub(super) fn of(outline: &[Vec2], placed: &[Vec3]) -> Self {
         let mut forward: Vec<usize> = (0..outline.len()).collect();
         if signed_area(outline) < 0.0 {
             forward.reverse();
         }
         let backward: Vec<usize> = forward.iter().rev().copied().collect();
-        let seen = |order: &[usize], mirrored| {
+        let on_the_right = placed.iter().map(|p| p.x).sum::<f64>() < 0.0;
+        let views = [(forward, false), (backward, true)].map(|(order, mirrored)| {
             let points: Vec<Vec2> = order.iter().map(|&i| flip(outline[i], mirrored)).collect();
-            least_rotation(&signature(&points))
-        };
-        let (plain, plain_start) = seen(&forward, false);
-        let (turned, turned_start) = seen(&backward, true);
-        let mirrored = turned < plain;
-        let (mut order, start) = if mirrored {
-            (backward, turned_start)
-        } else {
-            (forward, plain_start)
-        };
+            let (look, starts) = least_rotations(&signature(&points));
+            let place = |&start: &usize| {
+                let p = placed[order[start]];
+                [-p.y, -p.x.abs(), -p.z].map(rounded)
+            };
+            let start = starts.into_iter().min_by_key(place).unwrap_or(0);
+            (look, mirrored != on_the_right, start, order)
+        });
+        let [plain, turned] = views;
+        let mirrored = (&turned.0, turned.1) < (&plain.0, plain.1);
+        let (_, _, start, mut order) = if mirrored { turned } else { plain };
         order.rotate_left(start);
         let origin = outline[order[0]];
         let axis = flip(outline[order[1]] - origin, mirrored).normalize();
@@ -89,16 +93,22 @@ fn signature(points: &[Vec2]) -> Vec<[i64; 2]> {
             let (before, after) = (points[(i + count - 1) % count], points[(i + 1) % count]);
             let (u, v) = (points[i] - before, after - points[i]);
             let turn = cross2(u, v).atan2(u.dot(&v));
-            [turn, v.norm()].map(|value| (value / GRAIN).round() as i64)
+            [turn, v.norm()].map(rounded)
         })
         .collect()
 }
 
-/// The least of all rotations of `values`, and where it starts.
-fn least_rotation(values: &[[i64; 2]]) -> (Vec<[i64; 2]>, usize) {
+/// The least of all rotations of `values`, and everywhere it starts.
+fn least_rotations(values: &[[i64; 2]]) -> (Vec<[i64; 2]>, Vec<usize>) {
     let from = |start: usize| values[start..].iter().chain(&values[..start]);
-    let start = (0..values.len())
+    let least = (0..values.len())
         .min_by(|&a, &b| from(a).cmp(from(b)))
         .unwrap_or(0);
-    (from(start).copied().collect(), start)
+    let starts = (0..values.len()).filter(|&start| from(start).eq(from(least)));
+    (from(least).copied().collect(), starts.collect())
+}
+
+/// In whole grains.
+fn rounded(value: f64) -> i64 {
+    (value / GRAIN).round() as i64
 }

@@ -175,28 +175,41 @@ fn check(name: &str, pattern: &Pattern, mesh: &PatternMesh) -> QualitySummary {
 
 #[test]
 fn every_shared_garment_welds_without_a_flipped_triangle() {
-    for resolution in [0.02, 0.01] {
-        let mut all = Vec::new();
-        for file in shared_garments() {
-            let name = file.file_stem().unwrap().to_string_lossy().into_owned();
-            let pattern = read(&file).unwrap();
-            let start = std::time::Instant::now();
-            let mesh = mesh(&pattern, resolution)
-                .unwrap_or_else(|problems| panic!("{name}: {}", problems[0]));
-            let seconds = start.elapsed().as_secs_f64();
-            let quality = check(&name, &pattern, &mesh);
-            let (euler, most) = topology(mesh.cloth_vertex_count, &mesh.cloth_triangles());
-            println!(
-                "{name:45} {:6} vertices {:4.2} s  q min {:.3} 1% {:.3} mean {:.3}  Euler {euler} {most}",
-                mesh.x_bar.len(),
-                seconds,
-                quality.min,
-                quality.one_percent,
-                quality.mean
-            );
-            all.extend(qualities(&mesh.x_bar, &mesh.triangles));
-        }
-        println!("{resolution} {:?}", QualitySummary::of(&all));
+    weld_all(0.02);
+}
+
+#[test]
+#[ignore = "most of a minute"]
+fn every_shared_garment_welds_at_ten_millimetres() {
+    weld_all(0.01);
+}
+
+fn weld_all(resolution: f64) {
+    let mut all = Vec::new();
+    for file in shared_garments() {
+        let name = file.file_stem().unwrap().to_string_lossy().into_owned();
+        let pattern = read(&file).unwrap();
+        let start = std::time::Instant::now();
+        let mesh =
+            mesh(&pattern, resolution).unwrap_or_else(|problems| panic!("{name}: {}", problems[0]));
+        let seconds = start.elapsed().as_secs_f64();
+        let quality = check(&name, &pattern, &mesh);
+        let (euler, most) = topology(mesh.cloth_vertex_count, &mesh.cloth_triangles());
+        println!(
+            "{name:45} {:6} vertices {:4.2} s  q min {:.3} 1% {:.3} mean {:.3}  Euler {euler} {most}",
+            mesh.x_bar.len(),
+            seconds,
+            quality.min,
+            quality.one_percent,
+            quality.mean
+        );
+        all.extend(qualities(&mesh.x_bar, &mesh.triangles));
+    }
+    if let Some(quality) = QualitySummary::of(&all) {
+        println!("all at {resolution} m: {quality:?}");
+        // Worse than 0.25 only beside edges of a few millimetres: one triangle in ten thousand.
+        let poor = all.iter().filter(|q| **q < 0.25).count();
+        assert!(quality.min > 0.1 && quality.mean > 0.97 && poor * 10_000 < all.len());
     }
 }
 

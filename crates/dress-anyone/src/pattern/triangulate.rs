@@ -11,7 +11,7 @@ use super::sew::{Groups, centimetres, place, sew, sewing_problems};
 use super::{EdgeId, Panel, Pattern, PatternMesh};
 use crate::geometry::polygon::first_crossing;
 use crate::geometry::quality::quality;
-use crate::geometry::{Vec2, signed_area};
+use crate::geometry::{Vec2, Vec3, signed_area};
 use crate::problem::Problem;
 use rayon::prelude::*;
 
@@ -182,7 +182,7 @@ fn mesh_panel(panel: &Panel, pieces: &[usize], resolution: f64) -> Result<PanelM
             centimetres(outline[i])
         )));
     }
-    let (points, triangles) = fill_canonically(&outline, resolution)
+    let (points, triangles) = fill_canonically(panel, &outline, resolution)
         .ok_or_else(|| here("its outline cannot be filled with triangles; redraw it".into()))?;
     let corners = |t: &[u32; 3]| t.map(|v| points[v as usize]);
     if let Some(t) = triangles.iter().find(|t| quality(corners(t)) < DEGENERATE) {
@@ -200,8 +200,13 @@ fn mesh_panel(panel: &Panel, pieces: &[usize], resolution: f64) -> Result<PanelM
 }
 
 /// Fills the outline in its canonical frame; the outline itself comes back untouched and first.
-fn fill_canonically(outline: &[Vec2], resolution: f64) -> Option<(Vec<Vec2>, Vec<[u32; 3]>)> {
-    let canonical = Canonical::of(outline);
+fn fill_canonically(
+    panel: &Panel,
+    outline: &[Vec2],
+    resolution: f64,
+) -> Option<(Vec<Vec2>, Vec<[u32; 3]>)> {
+    let placed: Vec<Vec3> = outline.iter().map(|p| panel.placement.place(*p)).collect();
+    let canonical = Canonical::of(outline, &placed);
     let Filling {
         points,
         mut triangles,

@@ -1,8 +1,8 @@
 //! What a mesh must be, on patterns small enough to know.
 
 use super::*;
+use crate::geometry::Mat3;
 use crate::geometry::quality::{QualitySummary, qualities};
-use crate::geometry::{Mat3, Vec3};
 use crate::pattern::{Curve, Edge, Placement, Stitch};
 
 /// A panel of straight edges through `corners` \[m\].
