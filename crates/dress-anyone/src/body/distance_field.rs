@@ -72,7 +72,7 @@ impl DistanceField {
             .collect();
         let bricks: Vec<Vec<f64>> = stored
             .par_iter()
-            .map(|&b| grid.distances(b, &closest))
+            .map(|&b| grid.distances(b, &closest, reach))
             .collect();
         let mut starts = vec![ABSENT; brick_total];
         for (place, &b) in stored.iter().enumerate() {
@@ -131,8 +131,8 @@ impl DistanceField {
         size_of_val(self.values.as_slice()) + size_of_val(self.starts.as_slice())
     }
 
-    /// The 4³ coefficients around `p`, `[z][y][x]`, and the basis along x, y and z.
-    fn stencil(&self, p: Vec3) -> Option<([[[f64; 4]; 4]; 4], [Basis; 3])> {
+    /// The coefficients around `p` and the basis along x, y and z.
+    fn stencil(&self, p: Vec3) -> Option<(Coefficients, [Basis; 3])> {
         let u = (p - self.grid.origin) / self.grid.spacing;
         let mut first = [0; 3];
         for axis in 0..3 {
@@ -256,11 +256,13 @@ impl Grid {
         (corner + half, half.norm())
     }
 
-    /// Signed distances at a brick's nodes. They are visited back and forth, so that the triangle
-    /// under one node is a good first guess for the next.
-    fn distances(&self, index: usize, closest: &ClosestPoint) -> Vec<f64> {
+    /// Signed distances at a brick's nodes, `reach` where they are beyond it: no sample within the
+    /// band needs those. The nodes are visited back and forth, so that the triangle under one is a
+    /// good first guess for the next.
+    fn distances(&self, index: usize, closest: &ClosestPoint, reach: f64) -> Vec<f64> {
         let corner = self.brick(index).map(|i| i * SIDE);
         let mut values = vec![0.0; BRICK];
+        let mut value = -f64::INFINITY;
         let mut hint = None;
         for n in 0..BRICK {
             let turn = |i: usize, back: bool| if back { SIDE - 1 - i } else { i };
@@ -268,13 +270,19 @@ impl Grid {
             let y = turn(row % SIDE, z % 2 == 1);
             let x = turn(n % SIDE, row % 2 == 1);
             let p = self.position([corner[0] + x, corner[1] + y, corner[2] + z]);
-            let foot = match hint {
-                None => closest.query(p, f64::INFINITY),
-                Some(triangle) => closest.query_near(p, f64::INFINITY, triangle),
+            // Neighbours differ by their spacing at most, so one that far beyond is not asked.
+            if value - self.spacing > reach {
+                value -= self.spacing;
+            } else {
+                let foot = match hint {
+                    None => closest.query(p, f64::INFINITY),
+                    Some(triangle) => closest.query_near(p, f64::INFINITY, triangle),
+                }
+                .expect("the mesh has triangles and the point is finite");
+                hint = Some(foot.triangle);
+                value = closest.signed(p, &foot);
             }
-            .expect("the mesh has triangles and the point is finite");
-            hint = Some(foot.triangle);
-            values[(z * SIDE + y) * SIDE + x] = closest.signed(p, &foot);
+            values[(z * SIDE + y) * SIDE + x] = value;
         }
         values
     }
@@ -283,6 +291,9 @@ impl Grid {
 fn node_in_brick(node: [usize; 3]) -> usize {
     (node[2] % SIDE * SIDE + node[1] % SIDE) * SIDE + node[0] % SIDE
 }
+
+/// Values of 4³ neighbouring nodes, `[z][y][x]`.
+type Coefficients = [[[f64; 4]; 4]; 4];
 
 /// Weights of four neighbouring nodes, `[order of the derivative][node]`.
 type Basis = [[f64; 4]; 3];

@@ -1,81 +1,98 @@
-//! A tree of axis-aligned boxes around the items of a mesh, for nearest-item queries.
+//! A tree of bounding volumes around triangles, for nearest-triangle queries.
 //!
-//! Built by median splits along the longest axis, ties broken by item index, so the same items give
+//! A volume is a flat cylinder (a puck) lying on its patch of surface: on smooth meshes it hugs the
+//! patch far closer than a box, and a point hovering over many triangles opens only those below it.
+//! Built by median splits along the longest axis, ties broken by index, so the same triangles give
 //! the same tree. Nodes lie in one flat array, depth first: the left child of node i is i + 1.
 
 use super::Vec3;
+use super::mesh::bounds;
 
-/// A box tree over items known by their index.
+/// A volume tree over triangles known by their index.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Bvh {
     nodes: Vec<Node>,
-    /// Item indices; every leaf owns a range of them.
-    items: Vec<u32>,
+    /// Triangle indices; every leaf owns a range of them.
+    order: Vec<u32>,
+    /// The volume of each triangle, in the same order.
+    pucks: Vec<Puck>,
 }
 
-/// A box, and what it holds: `count` items from `first` on, or, when `count` is 0, a left child
-/// right behind it and a right child at `first`.
+/// A volume, and what it holds: `count` triangles from `first` on, or, when `count` is 0, a left
+/// child right behind it and a right child at `first`.
 #[derive(Clone, Debug, PartialEq)]
 struct Node {
-    low: Vec3,
-    high: Vec3,
+    puck: Puck,
     first: u32,
     count: u32,
 }
 
-/// Most items in a leaf.
+/// A cylinder about a unit `axis`.
+#[derive(Clone, Debug, PartialEq)]
+struct Puck {
+    centre: Vec3,
+    axis: Vec3,
+    radius: f64,
+    half_height: f64,
+}
+
+/// Most triangles in a leaf.
 const LEAF: usize = 4;
-/// Median splits halve, so even 2³² items stay below this depth.
+/// Median splits halve, so even 2³² triangles stay below this depth.
 const MAX_DEPTH: usize = 48;
-/// Boxes this much (relative) beyond the best squared distance are still opened, so that rounding
-/// never hides an item that ties.
-const SLACK: f64 = 1.0 + 1e-12;
+/// Pucks are made this much too large, so that rounding never hides a triangle that ties.
+const SLACK: f64 = 1.0 + 1e-7;
 
 impl Bvh {
-    /// A tree over `boxes`: smallest and largest corner of each item \[m\].
-    pub fn new(boxes: &[(Vec3, Vec3)]) -> Self {
+    /// A tree over triangles given by their corners \[m\].
+    pub fn new(triangles: &[[Vec3; 3]]) -> Self {
         let mut tree = Self {
-            nodes: Vec::with_capacity(boxes.len()),
-            items: (0..boxes.len() as u32).collect(),
+            nodes: Vec::with_capacity(triangles.len()),
+            order: (0..triangles.len() as u32).collect(),
+            pucks: Vec::new(),
         };
-        if !boxes.is_empty() {
-            tree.split(boxes, 0, boxes.len());
+        if !triangles.is_empty() {
+            tree.split(triangles, 0, triangles.len());
         }
+        let puck = |&t: &u32| Puck::around(&[triangles[t as usize]]);
+        tree.pucks = tree.order.iter().map(puck).collect();
         tree
     }
 
-    /// Items in the order of the leaves; the places [`Self::nearest`] speaks of index this.
-    pub fn items(&self) -> &[u32] {
-        &self.items
+    /// Triangles in the order of the leaves; the places [`Self::nearest`] speaks of index this.
+    pub fn order(&self) -> &[u32] {
+        &self.order
     }
 
-    /// Visits every place whose box is no farther from `p` than the bound, near boxes first.
-    /// `visit(place, bound)` returns the new squared bound \[m²\], at most the old one.
+    /// Visits every place that may be no farther from `p` than the squared bound \[m²\], roughly
+    /// near ones first. `visit(place, bound)` returns the new bound, at most the old one.
     pub fn nearest(&self, p: Vec3, mut bound: f64, mut visit: impl FnMut(usize, f64) -> f64) {
         let mut stack = [(0_u32, 0.0); MAX_DEPTH];
         let mut height = usize::from(!self.nodes.is_empty());
         while height > 0 {
             height -= 1;
             let (index, squared_distance) = stack[height];
-            if squared_distance > bound * SLACK {
+            if squared_distance > bound {
                 continue;
             }
             let node = &self.nodes[index as usize];
             if node.count > 0 {
-                for place in node.first..node.first + node.count {
-                    bound = visit(place as usize, bound);
+                for place in node.first as usize..(node.first + node.count) as usize {
+                    if self.pucks[place].squared_distance(p) <= bound {
+                        bound = visit(place, bound);
+                    }
                 }
                 continue;
             }
-            let left = (index + 1, self.squared_distance(index + 1, p));
-            let right = (node.first, self.squared_distance(node.first, p));
+            let [left, right] = [index + 1, node.first]
+                .map(|child| (child, self.nodes[child as usize].puck.squared_distance(p)));
             let (near, far) = if right.1 < left.1 {
                 (right, left)
             } else {
                 (left, right)
             };
             for child in [far, near] {
-                if child.1 <= bound * SLACK {
+                if child.1 <= bound {
                     stack[height] = child;
                     height += 1;
                 }
@@ -83,38 +100,67 @@ impl Bvh {
         }
     }
 
-    fn squared_distance(&self, node: u32, p: Vec3) -> f64 {
-        let node = &self.nodes[node as usize];
-        (p.inf(&node.high).sup(&node.low) - p).norm_squared()
-    }
-
-    /// Appends the subtree over `items[start..end]`, which is not empty.
-    fn split(&mut self, boxes: &[(Vec3, Vec3)], start: usize, end: usize) {
-        let items = &mut self.items[start..end];
-        let of = |item: u32| boxes[item as usize];
-        let (low, high) = (items.iter().map(|&i| of(i)))
-            .reduce(|a, b| (a.0.inf(&b.0), a.1.sup(&b.1)))
-            .expect("the range is not empty");
+    /// Appends the subtree over `order[start..end]`, which is not empty.
+    fn split(&mut self, triangles: &[[Vec3; 3]], start: usize, end: usize) {
+        let order = &mut self.order[start..end];
+        let patch: Vec<[Vec3; 3]> = order.iter().map(|&t| triangles[t as usize]).collect();
         let node = self.nodes.len();
         self.nodes.push(Node {
-            low,
-            high,
+            puck: Puck::around(&patch),
             first: start as u32,
             count: (end - start) as u32,
         });
         if end - start <= LEAF {
             return;
         }
+        let (low, high) = bounds(patch.as_flattened());
         let axis = (high - low).imax();
-        let middle = items.len() / 2;
-        items.select_nth_unstable_by(middle, |&i, &j| {
-            let key = |item: u32| of(item).0[axis] + of(item).1[axis];
+        let middle = order.len() / 2;
+        order.select_nth_unstable_by(middle, |&i, &j| {
+            let key = |t: u32| triangles[t as usize].iter().map(|p| p[axis]).sum::<f64>();
             key(i).total_cmp(&key(j)).then(i.cmp(&j))
         });
-        self.split(boxes, start, start + middle);
+        self.split(triangles, start, start + middle);
         self.nodes[node].first = self.nodes.len() as u32;
         self.nodes[node].count = 0;
-        self.split(boxes, start + middle, end);
+        self.split(triangles, start + middle, end);
+    }
+}
+
+impl Puck {
+    /// A puck about the mean normal of a patch.
+    fn around(patch: &[[Vec3; 3]]) -> Self {
+        let normal: Vec3 = (patch.iter())
+            .map(|[a, b, c]| (b - a).cross(&(c - a)))
+            .sum();
+        let axis = normal.try_normalize(0.0).unwrap_or_else(Vec3::y);
+        let points = patch.as_flattened();
+        let (low, high) = bounds(points);
+        let middle = (low + high) * 0.5;
+        let heights = points.iter().map(|p| (p - middle).dot(&axis));
+        let (bottom, top) = heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), h| {
+            (h.min(low), h.max(high))
+        });
+        let centre = middle + axis * (0.5 * (bottom + top));
+        let radius = (points.iter())
+            .map(|p| p - centre)
+            .map(|offset| (offset - axis * offset.dot(&axis)).norm())
+            .fold(0.0, f64::max);
+        let slack = (SLACK - 1.0) * (radius + top - bottom);
+        Self {
+            centre,
+            axis,
+            radius: radius + slack,
+            half_height: 0.5 * (top - bottom) + slack,
+        }
+    }
+
+    fn squared_distance(&self, p: Vec3) -> f64 {
+        let offset = p - self.centre;
+        let height = offset.dot(&self.axis);
+        let aside = (offset.norm_squared() - height * height).max(0.0).sqrt() - self.radius;
+        let above = (height.abs() - self.half_height).max(0.0);
+        above * above + aside.max(0.0) * aside.max(0.0)
     }
 }
 
@@ -124,34 +170,39 @@ mod tests {
     use crate::check::noise;
 
     #[test]
-    fn the_nearest_item_is_the_one_brute_force_finds() {
+    fn a_puck_is_no_farther_than_what_it_holds() {
         let point = |i: usize| Vec3::new(noise(3 * i), noise(3 * i + 1), noise(7 * i + 2));
-        let points: Vec<Vec3> = (0..500).map(point).collect();
-        let tree = Bvh::new(&points.iter().map(|&p| (p, p)).collect::<Vec<_>>());
         for i in 0..200 {
-            let p = point(1000 + i) * 1.5;
-            let squared = |item: u32| (points[item as usize] - p).norm_squared();
-            let mut best = (f64::INFINITY, u32::MAX);
-            let mut visited = 0;
-            tree.nearest(p, f64::INFINITY, |place, _| {
-                visited += 1;
-                let item = tree.items()[place];
-                best = if squared(item) < best.0 {
-                    (squared(item), item)
-                } else {
-                    best
-                };
-                best.0
-            });
-            let expected = (0..500).map(squared).fold(f64::INFINITY, f64::min);
-            assert_eq!(best.0, expected);
-            // A tree that pruned nothing would visit all 500.
-            assert!(visited < 250, "{visited} visited");
+            let triangle = [point(3 * i), point(3 * i + 1), point(3 * i + 2)];
+            let puck = Puck::around(&[triangle]);
+            let p = point(i + 5000) * 3.0;
+            let nearest = (triangle.iter().map(|q| (p - q).norm_squared())).fold(9e9, f64::min);
+            assert!(puck.squared_distance(p) <= nearest);
+            assert_eq!(puck.squared_distance(triangle[0]), 0.0);
         }
     }
 
     #[test]
+    fn far_triangles_are_not_visited() {
+        let flat = |t: usize| {
+            let corner = Vec3::new((t % 50) as f64, 0.0, (t / 50) as f64);
+            [corner, corner + Vec3::x(), corner + Vec3::z()]
+        };
+        let triangles: Vec<_> = (0..2500).map(flat).collect();
+        let tree = Bvh::new(&triangles);
+        let mut visited = Vec::new();
+        // 30 edges above the sheet: boxes and spheres would open hundreds of triangles.
+        let p = Vec3::new(20.2, 30.0, 17.2);
+        tree.nearest(p, 30.0_f64.powi(2), |place, bound| {
+            visited.push(tree.order()[place]);
+            bound
+        });
+        assert!(visited.contains(&(17 * 50 + 20)));
+        assert!(visited.len() < 10, "{visited:?}");
+    }
+
+    #[test]
     fn an_empty_tree_has_nothing_to_visit() {
-        Bvh::new(&[]).nearest(Vec3::zeros(), f64::INFINITY, |_, _| panic!("no items"));
+        Bvh::new(&[]).nearest(Vec3::zeros(), f64::INFINITY, |_, _| panic!("no triangles"));
     }
 }

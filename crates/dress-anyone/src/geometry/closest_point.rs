@@ -53,12 +53,6 @@ pub enum Feature {
 struct Facet {
     triangle: u32,
     corners: [Vec3; 3],
-    /// Unit normal; zero on a degenerate triangle.
-    normal: Vec3,
-    /// A disc about the centre, in the triangle's plane, covers the triangle.
-    centre: Vec3,
-    /// Radius of that disc \[m\].
-    radius: f64,
     /// Whether edge k is measured from corner k + 1 to corner k: both triangles at an edge walk it
     /// from the vertex of lower index, so they round alike and tie exactly.
     reversed: [bool; 3],
@@ -75,16 +69,19 @@ struct Pseudonormals {
 impl ClosestPoint {
     /// Prepares `mesh`.
     pub fn new(mesh: &TriangleMesh) -> Self {
-        let boxes: Vec<_> = (0..mesh.triangles.len())
-            .map(|t| super::mesh::bounds(&mesh.corners(t)))
-            .collect();
-        let tree = Bvh::new(&boxes);
-        let mut place_of_triangle = vec![0; boxes.len()];
+        let corners: Vec<[Vec3; 3]> = (0..mesh.triangles.len()).map(|t| mesh.corners(t)).collect();
+        let tree = Bvh::new(&corners);
+        let mut place_of_triangle = vec![0; corners.len()];
         let facet = |(place, &triangle): (usize, &u32)| {
             place_of_triangle[triangle as usize] = place as u32;
-            Facet::new(mesh, triangle)
+            let [a, b, c] = mesh.triangles[triangle as usize];
+            Facet {
+                triangle,
+                corners: corners[triangle as usize],
+                reversed: [b < a, c < b, a < c],
+            }
         };
-        let facets = tree.items().iter().enumerate().map(facet).collect();
+        let facets = tree.order().iter().enumerate().map(facet).collect();
         Self {
             tree,
             facets,
@@ -142,9 +139,6 @@ impl ClosestPoint {
         let mut best = start.filter(|nearest| nearest.squared_distance <= bound);
         let bound = best.map_or(bound, |nearest| nearest.squared_distance);
         self.tree.nearest(p, bound, |place, bound| {
-            if self.facets[place].is_beyond(p, bound) {
-                return bound;
-            }
             let found = self.facets[place].foot(p);
             let squared = found.squared_distance;
             let closer = best.map_or(squared <= bound, |best| {
@@ -192,33 +186,6 @@ impl Nearest {
 }
 
 impl Facet {
-    fn new(mesh: &TriangleMesh, triangle: u32) -> Self {
-        let corners = mesh.corners(triangle as usize);
-        let [i, j, k] = mesh.triangles[triangle as usize];
-        let [a, b, c] = corners;
-        let normal = (b - a).cross(&(c - a));
-        let centre = (a + b + c) / 3.0;
-        let radius = corners.map(|q| (q - centre).norm());
-        Self {
-            triangle,
-            corners,
-            normal: normal.try_normalize(0.0).unwrap_or_else(Vec3::zeros),
-            centre,
-            radius: radius[0].max(radius[1]).max(radius[2]),
-            reversed: [j < i, k < j, i < k],
-        }
-    }
-
-    /// Whether the facet's disc, and so the facet, is farther from `p` than the squared bound.
-    /// Cheap, and never true of a facet that ties with the bound.
-    fn is_beyond(&self, p: Vec3, bound: f64) -> bool {
-        let offset = p - self.centre;
-        let height = self.normal.dot(&offset);
-        let aside = (offset.norm_squared() - height * height).max(0.0).sqrt() - self.radius;
-        let squared = height * height + aside.max(0.0) * aside.max(0.0);
-        squared > bound + 1e-9 * (bound + self.radius * self.radius)
-    }
-
     /// The closest point of the facet: straight below `p` when that is inside, else the closest of
     /// the three edges.
     fn foot(&self, p: Vec3) -> Nearest {
