@@ -1,1 +1,133 @@
-//! Levenberg–Marquardt over plain vectors; knows nothing of garments.
+//! Levenberg–Marquardt steps over plain vectors; knows nothing of garments (METHOD §6.2).
+//!
+//! The loss is a sum of squared residuals R(p). With J = ∂R/∂p, H = JᵀJ and g = JᵀR, the step is
+//! d = −(H + μ diag H + μ ε I)⁻¹ g, the small ε for directions that change nothing.
+
+use nalgebra::{DMatrix, DVector};
+use serde::{Deserialize, Serialize};
+
+/// How to descend.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct DescentParams {
+    /// Largest number of accepted steps. Each costs a drape; the paper's gradient descent takes
+    /// hundreds.
+    pub iterations: usize,
+    /// Largest number of drapes refused in a row before the search is called stalled.
+    pub refusals: usize,
+    /// First damping μ \[–\].
+    pub damping: f64,
+    /// Farthest any pattern vertex moves in one step \[m\]: a drape's derivative is to be trusted
+    /// for one or two percent of a panel.
+    pub step: f64,
+    /// Converged when the loss falls by less than this part twice in a row \[–\].
+    pub tolerance: f64,
+    /// Converged when no pattern vertex moves farther than this in a step \[m\].
+    pub least_step: f64,
+}
+
+impl Default for DescentParams {
+    fn default() -> Self {
+        Self {
+            iterations: 30,
+            refusals: 6,
+            damping: 1e-2,
+            step: 0.03,
+            tolerance: 1e-2,
+            least_step: 2e-4,
+        }
+    }
+}
+
+/// The quadratic model of the loss at one point.
+#[derive(Clone, Debug)]
+pub struct Model {
+    h: DMatrix<f64>,
+    g: DVector<f64>,
+}
+
+impl Model {
+    /// From residuals and their Jacobian, `[residual][unknown]`.
+    pub fn new(jacobian: &DMatrix<f64>, residuals: &DVector<f64>) -> Self {
+        Self {
+            h: jacobian.tr_mul(jacobian),
+            g: jacobian.tr_mul(residuals),
+        }
+    }
+
+    /// ‖∂L/∂p‖ of the loss L = RᵀR.
+    pub fn gradient_norm(&self) -> f64 {
+        2.0 * self.g.norm()
+    }
+
+    /// The step for damping `mu`; none if the model is not finite.
+    pub fn step(&self, mu: f64) -> Option<DVector<f64>> {
+        let n = self.g.len();
+        let mean = self.h.diagonal().sum() / n as f64;
+        let mut damped = self.h.clone();
+        for i in 0..n {
+            damped[(i, i)] += mu * self.h[(i, i)] + mu * 1e-6 * mean;
+        }
+        Some(damped.cholesky()?.solve(&-&self.g))
+    }
+}
+
+/// The damping μ, as steps succeed and fail.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Damping(pub f64);
+
+impl Damping {
+    /// A step lowered the loss: trust the model more.
+    pub fn relax(&mut self) {
+        self.0 = (self.0 / 5.0).max(1e-8);
+    }
+
+    /// A step failed: trust the model less.
+    pub fn tighten(&mut self) {
+        self.0 *= 6.0;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn linear_residuals_are_solved_in_one_undamped_step() {
+        let j = DMatrix::from_row_slice(3, 2, &[1.0, 2.0, 0.5, -1.0, 3.0, 0.2]);
+        let solution = DVector::from_row_slice(&[0.7, -0.4]);
+        let model = Model::new(&j, &(-&j * &solution));
+        let step = model.step(0.0).expect("full rank");
+        assert!((step - solution).norm() < 1e-12);
+    }
+
+    #[test]
+    fn a_direction_that_changes_nothing_is_not_taken() {
+        let j = DMatrix::from_row_slice(2, 2, &[1.0, 0.0, 2.0, 0.0]);
+        let model = Model::new(&j, &DVector::from_row_slice(&[1.0, 1.0]));
+        let step = model.step(1e-2).expect("damped");
+        assert_eq!(step[1], 0.0);
+        assert!(step[0] < 0.0);
+    }
+
+    #[test]
+    fn rosenbrock_is_solved_with_the_damping_rule() {
+        let residuals =
+            |p: &DVector<f64>| DVector::from_row_slice(&[1.0 - p[0], 10.0 * (p[1] - p[0] * p[0])]);
+        let mut p = DVector::from_row_slice(&[-1.2, 1.0]);
+        let mut damping = Damping(1e-2);
+        for _ in 0..60 {
+            let j = DMatrix::from_row_slice(2, 2, &[-1.0, 0.0, -20.0 * p[0], 10.0]);
+            let r = residuals(&p);
+            let step = Model::new(&j, &r).step(damping.0).expect("damped");
+            let next = &p + step;
+            if residuals(&next).norm() < r.norm() {
+                p = next;
+                damping.relax();
+            } else {
+                damping.tighten();
+            }
+        }
+        assert!((p - DVector::from_row_slice(&[1.0, 1.0])).norm() < 1e-9);
+    }
+}

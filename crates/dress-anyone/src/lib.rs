@@ -47,5 +47,6 @@ pub mod loss;
 pub mod pattern;
 pub mod problem;
 pub mod refit;
+pub mod report;
 pub mod sim;
 pub mod transfer;

@@ -43,6 +43,9 @@ pub struct LossParams {
     pub whole_seam: f64,
     /// Area of each panel's drape against x*; 300 makes 1 % of area 0.03.
     pub area: f64,
+    /// Preference for conformal cages: the squared stretch |β|² that each panel's affine part may
+    /// add (`cage.kind = "green-affine"`); 1 makes 10 % stretch 0.01. Not in the paper.
+    pub affine: f64,
 }
 
 impl Default for LossParams {
@@ -55,6 +58,7 @@ impl Default for LossParams {
             seam_length: 300.0,
             whole_seam: 3000.0,
             area: 300.0,
+            affine: 1.0,
         }
     }
 }
