@@ -2,8 +2,8 @@
 //! O'Malley 2020). Geometry only: not physical, no pattern.
 //!
 //! 1. Carry every cloth vertex from the space around the source body to that around the target
-//!    ([`bind`]).
-//! 2. Repeat: give it back its distance to the body, and relax ([`relax`]), which keeps the garment's
+//!    (`bind`).
+//! 2. Repeat: give it back its distance to the body, and relax (`relax`), which keeps the garment's
 //!    layout and folds through affine-invariant stencils.
 //! 3. Push out what still touches the body.
 //!
@@ -32,8 +32,8 @@ pub struct TransferParams {
     pub tightness: f64,
     /// What becomes of the garment's distance to the body. The paper does not say.
     pub ease: Ease,
-    /// Least distance to the body \[m\]; where the source drape is closer, its distance. 1e-3 to
-    /// 5e-3; the simulator's contact distance or more saves it a push.
+    /// Least distance to the body \[m\]; where the source drape is closer, its distance, but never
+    /// inside the body. 1e-3 to 5e-3; the simulator's contact distance or more saves it a push.
     pub thickness: f64,
     /// Most rounds of the loop \[–\]. 10 usually suffice; original: 25.
     pub iterations: usize,
@@ -116,6 +116,9 @@ pub enum TransferError {
 /// Share of the way back to the first binding on which each round starts: 0 creeps along the body,
 /// 1 never slides.
 const RETURN: f64 = 0.5;
+/// Rounds in full steps; later ones shorten as 1, 1/2, 1/3 …: above a crease of the body the nearest
+/// side may change with every round, and short steps settle between.
+const FULL_ROUNDS: usize = 4;
 /// Distances \[m\] below which the distance is restored fully, and above which not at all.
 const CLOSE: (f64, f64) = (0.01, 0.05);
 /// Beyond this distance \[m\] cloth hangs: it is held a fifth as firmly.
@@ -161,6 +164,7 @@ pub fn target_shape(
     let (low, high) = bounds(drape);
     let still = params.tolerance * (high - low).norm();
     let mut x: Vec<Vec3> = bound.iter().map(|carried| carried.point).collect();
+    let least = |wanted: f64| wanted.clamp(0.0, params.thickness);
     let mut iterations = 0;
     let mut converged = false;
     while iterations < params.iterations && !converged {
@@ -172,18 +176,23 @@ pub fn target_shape(
                 let trust = 1.0 - smoothstep((distance[v] - CLOSE.0) / (CLOSE.1 - CLOSE.0));
                 at_distance(&on_target, start, |now| {
                     let restored = now + trust * (wanted - now);
-                    restored.max(params.thickness.min(wanted))
+                    restored.max(least(wanted))
                 })
             })
             .collect();
         let relaxed = relaxation.relax(&z);
-        let moves = relaxed.iter().zip(&x).map(|(a, b)| (a - b).norm());
-        converged = moves.fold(0.0, f64::max) <= still;
-        x = relaxed;
+        let step = 1.0 / (1 + iterations.saturating_sub(FULL_ROUNDS)) as f64;
+        let mut farthest = 0.0_f64;
+        for (x, relaxed) in x.iter_mut().zip(relaxed) {
+            let move_ = (relaxed - *x) * step;
+            farthest = farthest.max(move_.norm());
+            *x += move_;
+        }
+        converged = farthest <= still;
         iterations += 1;
     }
     let least: Vec<f64> = (distance.iter().zip(&bound))
-        .map(|(distance, carried)| params.thickness.min(distance * carried.ease))
+        .map(|(distance, carried)| least(distance * carried.ease))
         .collect();
     push_out(&mut x, &on_target, &rings, &least);
     let clearance = (x.par_iter())

@@ -56,7 +56,7 @@ pub(super) struct Carried {
 /// the body's details, wider is smoother.
 const WIDTH: f64 = 0.015;
 /// How much wider the patch grows per distance from the body.
-const SPREAD: f64 = 0.6;
+const SPREAD: f64 = 1.2;
 /// Share of the patch's spread below which a direction counts as across the surface.
 const THIN: f64 = 0.02;
 /// Weight of a piece that faces away from the cloth: only matters where nothing else is near.
@@ -290,9 +290,10 @@ mod tests {
         for i in 0..50 {
             let direction = point(i).normalize();
             let carried = map.carry(direction * 0.31, direction, 0.01).point;
-            // The patch is a cap of 2.2 cm: its sag, 0.3 mm, grows by a fifth.
+            // The patch is a cap 7 cm wide that sags by 7²/(2·30) = 0.8 cm, a fifth more on the
+            // larger ball.
             let error = (carried - direction * 0.37).norm();
-            assert!(error < 1e-3, "{error:e}");
+            assert!(error < 1.6e-3, "{error:e}");
         }
     }
 
