@@ -39,6 +39,9 @@ impl Default for DescentParams {
     }
 }
 
+/// Residuals taken together: enough to multiply matrices rather than vectors.
+const CHUNK: usize = 2048;
+
 /// The quadratic model of the loss at one point.
 #[derive(Clone, Debug)]
 pub struct Model {
@@ -47,12 +50,29 @@ pub struct Model {
 }
 
 impl Model {
-    /// From residuals and their Jacobian, `[residual][unknown]`.
-    pub fn new(jacobian: &DMatrix<f64>, residuals: &DVector<f64>) -> Self {
-        Self {
-            h: jacobian.tr_mul(jacobian),
-            g: jacobian.tr_mul(residuals),
+    /// From `count` residuals by `unknowns`: `fill(i, row)` writes ∂Rᵢ/∂p into a row of zeros and
+    /// returns Rᵢ. The Jacobian is never held whole.
+    pub fn new(
+        count: usize,
+        unknowns: usize,
+        mut fill: impl FnMut(usize, &mut [f64]) -> f64,
+    ) -> Self {
+        let mut h = DMatrix::zeros(unknowns, unknowns);
+        let mut g = DVector::zeros(unknowns);
+        let mut first = 0;
+        while first < count {
+            let rows = CHUNK.min(count - first);
+            // Column i of the transposed chunk is residual first + i.
+            let mut transposed = DMatrix::zeros(unknowns, rows);
+            let mut residuals = DVector::zeros(rows);
+            for (i, mut column) in transposed.column_iter_mut().enumerate() {
+                residuals[i] = fill(first + i, column.as_mut_slice());
+            }
+            h.gemm(1.0, &transposed, &transposed.transpose(), 1.0);
+            g.gemv(1.0, &transposed, &residuals, 1.0);
+            first += rows;
         }
+        Self { h, g }
     }
 
     /// ‖∂L/∂p‖ of the loss L = RᵀR.
@@ -92,11 +112,18 @@ impl Damping {
 mod tests {
     use super::*;
 
+    fn model(j: &DMatrix<f64>, r: &DVector<f64>) -> Model {
+        Model::new(j.nrows(), j.ncols(), |i, row| {
+            row.copy_from_slice(j.row(i).transpose().as_slice());
+            r[i]
+        })
+    }
+
     #[test]
     fn linear_residuals_are_solved_in_one_undamped_step() {
         let j = DMatrix::from_row_slice(3, 2, &[1.0, 2.0, 0.5, -1.0, 3.0, 0.2]);
         let solution = DVector::from_row_slice(&[0.7, -0.4]);
-        let model = Model::new(&j, &(-&j * &solution));
+        let model = model(&j, &(-&j * &solution));
         let step = model.step(0.0).expect("full rank");
         assert!((step - solution).norm() < 1e-12);
     }
@@ -104,7 +131,7 @@ mod tests {
     #[test]
     fn a_direction_that_changes_nothing_is_not_taken() {
         let j = DMatrix::from_row_slice(2, 2, &[1.0, 0.0, 2.0, 0.0]);
-        let model = Model::new(&j, &DVector::from_row_slice(&[1.0, 1.0]));
+        let model = model(&j, &DVector::from_row_slice(&[1.0, 1.0]));
         let step = model.step(1e-2).expect("damped");
         assert_eq!(step[1], 0.0);
         assert!(step[0] < 0.0);
@@ -119,7 +146,7 @@ mod tests {
         for _ in 0..60 {
             let j = DMatrix::from_row_slice(2, 2, &[-1.0, 0.0, -20.0 * p[0], 10.0]);
             let r = residuals(&p);
-            let step = Model::new(&j, &r).step(damping.0).expect("damped");
+            let step = model(&j, &r).step(damping.0).expect("damped");
             let next = &p + step;
             if residuals(&next).norm() < r.norm() {
                 p = next;

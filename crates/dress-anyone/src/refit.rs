@@ -4,6 +4,7 @@
 //! (§4.5) → initial scale → drapes and steps (§3, §4.4) → the pattern as written.
 
 pub mod dress;
+mod flatten;
 mod measure;
 mod search;
 mod written;
@@ -198,16 +199,22 @@ pub fn refit(
         params: &params.sim,
     };
     let losses = Losses::new(&garment.pattern, mesh, &x_star, &params.loss);
+    let motions = search::motions(&cages, mesh);
     let search = search::Search {
         mesh,
         cages: &cages,
         losses: &losses,
         scene: &scene,
+        x_star: &x_star,
         params: &params.descent,
-        affine_weight: params.loss.affine,
+        body: &target.name,
+        motions: &motions,
     };
-    clock.stage("initial guess", observe);
-    let found = search.run(&cages.scaled(scale), &x_star, &mut clock, observe)?;
+    clock.stage("search", observe);
+    let initial = cages.scaled(scale);
+    let drapes = [source_drape.as_slice(), &x_star];
+    let flattened = flatten::flatten(mesh, &cages, &motions, &losses, drapes, initial.clone());
+    let found = search.run([initial, flattened], &clock, observe)?;
 
     // The pattern as it will be cut: curves within the tolerance, and the drape of just that.
     clock.stage("pattern as written", observe);

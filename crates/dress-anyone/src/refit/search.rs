@@ -15,7 +15,7 @@ use crate::sim::drape::Differentiable;
 use crate::sim::energy::contact::Surface;
 use crate::sim::equilibrium::RestStatus;
 use crate::sim::{Drape, Scene, Start, drape};
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DVector;
 
 /// Predicted moves of the cloth beyond this are not trusted as a start \[m\].
 const FARTHEST_PREDICTION: f64 = 0.03;
@@ -23,18 +23,24 @@ const FARTHEST_PREDICTION: f64 = 0.03;
 const LEAST_QUALITY: f64 = 0.85;
 /// A refused step is tried again only while it moves the pattern farther than this \[m\].
 const SHORTEST_TRIAL: f64 = 1e-5;
+/// How often a settled search drapes its pattern again from the target shape.
+const FRESH_STARTS: usize = 2;
 
 /// Everything the search needs and does not change.
 pub(super) struct Search<'a, S> {
+    /// Name of the target body, for messages.
+    pub(super) body: &'a str,
     pub(super) mesh: &'a PatternMesh,
     pub(super) cages: &'a Cages,
+    /// ∂x̄ along each unknown, `[unknown][pattern vertex]`.
+    pub(super) motions: &'a [Vec<Vec2>],
     pub(super) losses: &'a Losses,
     pub(super) scene: &'a Scene<'a, S>,
+    pub(super) x_star: &'a [Vec3],
     pub(super) params: &'a DescentParams,
-    pub(super) affine_weight: f64,
 }
 
-/// The best so far.
+/// A pattern, its drape, and its loss.
 struct Point<'a> {
     zeta: Vec<f64>,
     state: Differentiable<'a>,
@@ -43,72 +49,84 @@ struct Point<'a> {
     total: f64,
 }
 
-/// Work done, for the report.
-#[derive(Default)]
-struct Tally {
+/// What changes while searching.
+struct Run<'a, 'b> {
+    notes: Vec<Iteration>,
     drapes: usize,
     factorisations: usize,
+    clock: &'a Clock,
+    observe: &'a mut Observer<'b>,
+    go_on: bool,
 }
 
-impl<S: Surface> Search<'_, S> {
-    /// Searches from the unknowns `zeta`, draping first from the target shape.
+impl<'s, S: Surface> Search<'s, S> {
+    /// Searches from the better of two guesses, the initial one first. Both are draped from the
+    /// target shape.
     pub(super) fn run(
         &self,
-        zeta: &[f64],
-        x_star: &[Vec3],
-        clock: &mut Clock,
+        [initial, flattened]: [Vec<f64>; 2],
+        clock: &Clock,
         observe: &mut Observer<'_>,
     ) -> Result<Found, RefitError> {
-        let mut tally = Tally::default();
-        let first = self.drape(zeta, x_star.to_vec(), &mut tally, observe);
-        let (status, residual) = (first.status, first.residual);
-        if status == RestStatus::Stopped {
-            return Err(RefitError::Stopped);
-        }
-        let failed = || RefitError::NotAtRest {
-            body: "target".to_owned(),
-            status,
-            residual,
+        let mut run = Run {
+            notes: Vec::new(),
+            drapes: 0,
+            factorisations: 0,
+            clock,
+            observe,
+            go_on: true,
         };
-        let mut best = self.point(zeta.to_vec(), first).ok_or_else(failed)?;
+        let mut best = self.first(initial, &mut run)?;
         let initial = best.state.drape.x.clone();
+        self.note(&best, 0.0, &mut run);
+        let mut moved = f64::INFINITY;
+        if run.go_on {
+            let second = self.drape(&flattened, self.x_star.to_vec(), &mut run);
+            let second = self.point(flattened, second);
+            if let Some(better) = second.filter(|second| second.total < best.total) {
+                moved = farthest(&better.state.drape.x_bar, &best.state.drape.x_bar);
+                best = better;
+                self.note(&best, moved, &mut run);
+            }
+        }
         let floor = LEAST_QUALITY * self.least_quality(&self.mesh.x_bar);
         let mut damping = Damping(self.params.damping);
-        let mut history = Vec::new();
-        let mut moved = 0.0;
         let mut slow = 0;
-        clock.stage("search", observe);
+        let mut fresh_starts = 0;
         let status = loop {
-            let model = self.model(&best);
-            let note = self.note(&best, &model, moved, &tally, history.len(), clock);
-            let go_on = observe(&Progress::Iteration {
-                iteration: note.iteration,
-                loss: note.loss,
-                terms: note.terms,
-            });
-            history.push(note);
-            if !go_on {
+            if !run.go_on {
                 break Status::Stopped;
             }
-            if slow >= 2 || (history.len() > 1 && moved < self.params.least_step) {
-                break Status::Converged;
-            }
-            if history.len() > self.params.iterations {
+            if run.notes.len() > self.params.iterations {
                 break Status::IterationLimit;
             }
-            match self.step(&best, &model, floor, &mut damping, &mut tally, observe) {
-                Stepped::Better(next, distance) => {
-                    let fall = (best.total - next.total) / best.total;
-                    slow = if fall < self.params.tolerance {
-                        slow + 1
-                    } else {
-                        0
-                    };
-                    (best, moved) = (*next, distance);
-                }
-                Stepped::NoBetter if slow > 0 => break Status::Converged,
-                Stepped::NoBetter => break Status::Stalled,
+            let settled = slow >= 2 || moved < self.params.least_step;
+            let mut stepped = Stepped::NoBetter;
+            if !settled {
+                stepped = self.step(&best, floor, &mut damping, &mut run);
+            }
+            if matches!(stepped, Stepped::NoBetter) && fresh_starts < FRESH_STARTS {
+                fresh_starts += 1;
+                stepped = self.afresh(&best, &mut run);
+            }
+            let next = match stepped {
+                Stepped::Better(next) => *next,
                 Stepped::Interrupted => break Status::Stopped,
+                Stepped::NoBetter if slow > 0 || settled => break Status::Converged,
+                Stepped::NoBetter => break Status::Stalled,
+            };
+            let fall = (best.total - next.total) / best.total;
+            slow = if fall < self.params.tolerance {
+                slow + 1
+            } else {
+                0
+            };
+            moved = farthest(&next.state.drape.x_bar, &best.state.drape.x_bar);
+            best = next;
+            self.note(&best, moved, &mut run);
+            if moved == 0.0 {
+                // A fresh start: the same pattern, to be searched from again.
+                moved = f64::INFINITY;
             }
         };
         Ok(Found {
@@ -116,39 +134,45 @@ impl<S: Surface> Search<'_, S> {
             x: best.state.drape.x,
             initial,
             status,
-            iterations: history,
+            iterations: run.notes,
         })
     }
 
-    fn drape(
-        &self,
-        zeta: &[f64],
-        start: Vec<Vec3>,
-        tally: &mut Tally,
-        observe: &mut Observer<'_>,
-    ) -> Drape {
+    /// The initial guess at rest.
+    fn first(&self, zeta: Vec<f64>, run: &mut Run<'_, '_>) -> Result<Point<'s>, RefitError> {
+        let found = self.drape(&zeta, self.x_star.to_vec(), run);
+        let (status, residual) = (found.status, found.residual);
+        if status == RestStatus::Stopped {
+            return Err(RefitError::Stopped);
+        }
+        let body = self.body.to_owned();
+        self.point(zeta, found).ok_or(RefitError::NotAtRest {
+            body,
+            status,
+            residual,
+        })
+    }
+
+    /// Drapes the pattern of the unknowns `zeta` from a nearby start.
+    fn drape(&self, zeta: &[f64], start: Vec<Vec3>, run: &mut Run<'_, '_>) -> Drape {
         let x_bar = self.cages.deform(zeta);
         let found = drape(self.scene, &x_bar, start, Start::Near, &mut |p| {
-            observe(&Progress::Drape(p))
+            (run.observe)(&Progress::Drape(p))
         });
-        tally.drapes += 1;
-        tally.factorisations += found.iterations;
+        run.drapes += 1;
+        run.factorisations += found.iterations;
         found
     }
 
     /// The loss at a drape; none unless it is at rest.
-    fn point(&self, zeta: Vec<f64>, found: Drape) -> Option<Point<'_>> {
+    fn point(&self, zeta: Vec<f64>, found: Drape) -> Option<Point<'s>> {
         if found.status != RestStatus::AtRest {
             return None;
         }
         let state = found.differentiable(self.scene)?;
         let loss = self.losses.evaluate(&state.drape.x, &state.drape.x_bar);
-        let total = loss.total
-            + self
-                .affine_rows(&zeta)
-                .iter()
-                .map(|(_, r, _)| r * r)
-                .sum::<f64>();
+        let priors = self.affine_rows(&zeta);
+        let total = loss.total + priors.iter().map(|(_, r, _)| r * r).sum::<f64>();
         Some(Point {
             zeta,
             state,
@@ -159,7 +183,7 @@ impl<S: Surface> Search<'_, S> {
 
     /// The prior that prefers conformal maps: rows (unknown, residual, derivative).
     fn affine_rows(&self, zeta: &[f64]) -> Vec<(usize, f64, f64)> {
-        let weight = self.affine_weight.sqrt();
+        let weight = self.losses.weights().affine.sqrt();
         let affine = self.cages.affine_unknowns().into_iter();
         affine
             .map(|(j, size)| (j, weight * zeta[j] / size, weight / size))
@@ -169,99 +193,85 @@ impl<S: Surface> Search<'_, S> {
     /// The Gauss–Newton model at `best`: residuals of all terms by all unknowns, through drape and
     /// cage.
     fn model(&self, best: &Point<'_>) -> Model {
-        let count = self.cages.unknown_count();
-        let motions: Vec<Vec<Vec2>> = (0..count)
-            .map(|j| {
-                let mut motion = vec![Vec2::zeros(); self.mesh.x_bar.len()];
-                for (v, d) in self.cages.column(j) {
-                    motion[v as usize] += d;
-                }
-                motion
-            })
-            .collect();
         let drape = &best.state.drape;
-        let moves = best.state.sensitivities(motions.iter().cloned());
+        let moves = best.state.sensitivities(self.motions.iter().cloned());
         let rows = self.losses.rows(&drape.x, &drape.x_bar);
         let priors = self.affine_rows(&best.zeta);
-        let mut jacobian = DMatrix::zeros(rows.len() + priors.len(), count);
-        for j in 0..count {
-            let moves = &moves[3 * drape.x.len() * j..];
-            for (i, row) in rows.iter().enumerate() {
-                jacobian[(i, j)] = slope(row, moves, &motions[j]);
+        let count = rows.len() + priors.len();
+        Model::new(count, self.motions.len(), |i, by| {
+            if let Some(row) = rows.get(i) {
+                for (j, motion) in self.motions.iter().enumerate() {
+                    by[j] = slope(row, &moves[3 * drape.x.len() * j..], motion);
+                }
+                row.value
+            } else {
+                let (j, value, slope) = priors[i - rows.len()];
+                by[j] = slope;
+                value
             }
-        }
-        for (i, (j, _, by)) in priors.iter().enumerate() {
-            jacobian[(rows.len() + i, *j)] = *by;
-        }
-        let values = rows
-            .iter()
-            .map(|r| r.value)
-            .chain(priors.iter().map(|p| p.1));
-        let residuals = DVector::from_iterator(rows.len() + priors.len(), values);
-        Model::new(&jacobian, &residuals)
+        })
     }
 
     /// Tries ever shorter steps until one is accepted.
     fn step(
         &self,
         best: &Point<'_>,
-        model: &Model,
         floor: f64,
         damping: &mut Damping,
-        tally: &mut Tally,
-        observe: &mut Observer<'_>,
-    ) -> Stepped<'_> {
+        run: &mut Run<'_, '_>,
+    ) -> Stepped<'s> {
+        let model = self.model(best);
         let rigid = self.cages.rigid_modes(&best.zeta);
         for _ in 0..self.params.refusals {
             let Some(mut step) = model.step(damping.0) else {
                 return Stepped::NoBetter;
             };
             without(&mut step, &rigid);
-            let Some((zeta, moved)) = self.cuttable(best, &mut step, floor) else {
+            let Some(zeta) = self.cuttable(best, &mut step, floor) else {
                 return Stepped::NoBetter;
             };
-            let start = self.predict(best, &step);
-            let found = self.drape(&zeta, start, tally, observe);
+            let found = self.drape(&zeta, self.predict(best, &step), run);
             if found.status == RestStatus::Stopped {
                 return Stepped::Interrupted;
             }
-            if let Some(next) = self
-                .point(zeta, found)
-                .filter(|next| next.total < best.total)
-            {
+            let next = self.point(zeta, found);
+            if let Some(next) = next.filter(|next| next.total < best.total) {
                 damping.relax();
-                return Stepped::Better(Box::new(next), moved);
+                return Stepped::Better(Box::new(next));
             }
             damping.tighten();
         }
         Stepped::NoBetter
     }
 
+    /// The pattern at hand, draped again from the target shape: the drape may be caught in a fold
+    /// that a fresh start does not have.
+    fn afresh(&self, best: &Point<'_>, run: &mut Run<'_, '_>) -> Stepped<'s> {
+        let found = self.drape(&best.zeta, self.x_star.to_vec(), run);
+        if found.status == RestStatus::Stopped {
+            return Stepped::Interrupted;
+        }
+        let clearly_better = (1.0 - self.params.tolerance) * best.total;
+        self.point(best.zeta.clone(), found)
+            .filter(|next| next.total < clearly_better)
+            .map_or(Stepped::NoBetter, |next| Stepped::Better(Box::new(next)))
+    }
+
     /// Shortens `step` until no pattern vertex moves too far and the rest shape can be cut: cages
     /// and outlines do not cross, and no triangle is poor or flipped.
-    fn cuttable(
-        &self,
-        best: &Point<'_>,
-        step: &mut DVector<f64>,
-        floor: f64,
-    ) -> Option<(Vec<f64>, f64)> {
+    fn cuttable(&self, best: &Point<'_>, step: &mut DVector<f64>, floor: f64) -> Option<Vec<f64>> {
         loop {
-            let zeta: Vec<f64> = best
-                .zeta
-                .iter()
-                .zip(step.iter())
-                .map(|(z, d)| z + d)
-                .collect();
+            let moved_by = best.zeta.iter().zip(step.iter());
+            let zeta: Vec<f64> = moved_by.map(|(z, d)| z + d).collect();
             let x_bar = self.cages.deform(&zeta);
-            let pairs = x_bar.iter().zip(&best.state.drape.x_bar);
-            let moved = pairs.map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
+            let moved = farthest(&x_bar, &best.state.drape.x_bar);
             if !(moved > SHORTEST_TRIAL) {
                 return None;
             }
             if moved > self.params.step {
                 *step *= 0.999 * self.params.step / moved;
             } else if self.cages.check(&zeta).is_ok() && self.least_quality(&x_bar) >= floor {
-                return Some((zeta, moved));
+                return Some(zeta);
             } else {
                 *step *= 0.5;
             }
@@ -269,67 +279,91 @@ impl<S: Surface> Search<'_, S> {
     }
 
     fn least_quality(&self, x_bar: &[Vec2]) -> f64 {
-        qualities(x_bar, &self.mesh.triangles)
-            .into_iter()
-            .fold(f64::INFINITY, f64::min)
+        let each = qualities(x_bar, &self.mesh.triangles);
+        each.into_iter().fold(f64::INFINITY, f64::min)
     }
 
     /// Where the drape goes to first order, if that is near enough to be believed.
     fn predict(&self, best: &Point<'_>, step: &DVector<f64>) -> Vec<Vec3> {
         let mut motion = vec![Vec2::zeros(); self.mesh.x_bar.len()];
-        for (j, d) in step.iter().enumerate() {
-            for (v, by) in self.cages.column(j) {
-                motion[v as usize] += by * *d;
+        for (by, d) in self.motions.iter().zip(step.iter()) {
+            for (sum, by) in motion.iter_mut().zip(by) {
+                *sum += by * *d;
             }
         }
         let moves = best.state.sensitivities(std::iter::once(motion));
         let x = &best.state.drape.x;
-        let moves: Vec<Vec3> = moves
-            .chunks_exact(3)
-            .map(|c| Vec3::new(c[0], c[1], c[2]))
+        let moved = x.iter().zip(moves.chunks_exact(3));
+        let moved: Vec<Vec3> = moved
+            .map(|(p, d)| p + Vec3::new(d[0], d[1], d[2]))
             .collect();
-        if moves.iter().any(|d| !(d.norm() < FARTHEST_PREDICTION)) {
-            return x.clone();
-        }
-        x.iter().zip(moves).map(|(p, d)| p + d).collect()
+        let far = moved
+            .iter()
+            .zip(x)
+            .any(|(a, b)| !((a - b).norm() < FARTHEST_PREDICTION));
+        if far { x.clone() } else { moved }
     }
 
-    fn note(
-        &self,
-        best: &Point<'_>,
-        model: &Model,
-        moved: f64,
-        tally: &Tally,
-        iteration: usize,
-        clock: &Clock,
-    ) -> Iteration {
-        let (_, lambda) = best.state.pull_back(&best.loss.x_hat);
-        Iteration {
+    /// Notes an accepted point, and tells it.
+    fn note(&self, best: &Point<'_>, moved: f64, run: &mut Run<'_, '_>) {
+        let (through_drape, lambda) = best.state.pull_back(&best.loss.x_hat);
+        let direct = &best.loss.x_bar_hat;
+        let hat: Vec<Vec2> = through_drape
+            .iter()
+            .zip(direct)
+            .map(|(a, b)| a + b)
+            .collect();
+        let gradient = self.cages.pull_back(&hat);
+        let iteration = run.notes.len();
+        run.go_on = (run.observe)(&Progress::Iteration {
+            iteration,
+            loss: best.total,
+            terms: best.loss.terms,
+        });
+        run.notes.push(Iteration {
             iteration,
             loss: best.total,
             shape_matching: best.loss.terms.shape_matching(self.losses.weights()),
             terms: best.loss.terms,
-            gradient_norm: model.gradient_norm(),
+            gradient_norm: gradient.iter().map(|g| g * g).sum::<f64>().sqrt(),
             adjoint_norm: lambda.iter().map(Vec3::norm).fold(0.0, f64::max),
             residual: best.state.drape.residual,
             shift: best.state.shift,
             moved,
-            drapes: tally.drapes,
-            factorisations: tally.factorisations,
-            elapsed: clock.elapsed(),
-        }
+            drapes: run.drapes,
+            factorisations: run.factorisations,
+            elapsed: run.clock.elapsed(),
+        });
     }
 }
 
 /// How a step ended.
 enum Stepped<'a> {
-    Better(Box<Point<'a>>, f64),
+    Better(Box<Point<'a>>),
     NoBetter,
     Interrupted,
 }
 
+/// Farthest any vertex is from its partner \[m\].
+fn farthest(a: &[Vec2], b: &[Vec2]) -> f64 {
+    let apart = a.iter().zip(b).map(|(a, b)| (a - b).norm());
+    apart.fold(0.0, f64::max)
+}
+
+/// ∂x̄ along each unknown of `cages`, `[unknown][pattern vertex]`.
+pub(super) fn motions(cages: &Cages, mesh: &PatternMesh) -> Vec<Vec<Vec2>> {
+    let motion = |j: usize| {
+        let mut motion = vec![Vec2::zeros(); mesh.x_bar.len()];
+        for (v, d) in cages.column(j) {
+            motion[v as usize] += d;
+        }
+        motion
+    };
+    (0..cages.unknown_count()).map(motion).collect()
+}
+
 /// ∂r along one unknown: through the cloth's moves and the pattern's motion.
-fn slope(row: &Row, moves: &[f64], motion: &[Vec2]) -> f64 {
+pub(super) fn slope(row: &Row, moves: &[f64], motion: &[Vec2]) -> f64 {
     let mut sum = 0.0;
     for (v, g) in &row.x {
         let d = &moves[3 * *v as usize..];
@@ -343,7 +377,7 @@ fn slope(row: &Row, moves: &[f64], motion: &[Vec2]) -> f64 {
 
 /// Removes from `step` what only moves panels about: it does nothing to the drape, and would turn
 /// panels against their grain.
-fn without(step: &mut DVector<f64>, rigid: &[Vec<f64>]) {
+pub(super) fn without(step: &mut DVector<f64>, rigid: &[Vec<f64>]) {
     for mode in rigid {
         let along: f64 = mode.iter().zip(step.iter()).map(|(m, s)| m * s).sum();
         for (s, m) in step.iter_mut().zip(mode) {

@@ -191,7 +191,7 @@ impl Drape {
         );
         let mut shift = 0.0;
         let factor = loop {
-            let mut k = system.stiffness(&found.x, false);
+            let mut k = system.stiffness(&found.x, 1.0);
             k.add_diagonal(shift, &self.rest.mass);
             if let Some(factor) = k.factor() {
                 break factor;

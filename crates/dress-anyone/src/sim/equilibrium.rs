@@ -75,12 +75,12 @@ pub struct Equilibrium {
     pub status: RestStatus,
 }
 
-/// Residual below which the exact stiffness is tried.
-const EXACT_BELOW: f64 = 0.1;
+/// Residual above which compressive stress is left out: far from rest it only makes steps fail.
+const EXACT_BELOW: f64 = 3.0;
+/// Below this part of the compressive stress none of it is tried.
+const LEAST_EXACTNESS: f64 = 0.1;
 /// Residual below which energy differences drown in round-off, and the residual itself must fall.
 const ROUND_OFF_BELOW: f64 = 1e-4;
-/// Iterations for which elements stay clamped after the exact stiffness proved indefinite.
-const CLAMPED_FOR: usize = 3;
 /// A garment whose centre moves this far \[m\] over [`SLIDE_WINDOW`] late iterations slides.
 const SLIDE: f64 = 0.01;
 /// Iterations over which sliding is judged.
@@ -101,7 +101,7 @@ pub fn find<S: Surface>(
     let mut energy = system.energy(&x);
     let mut force = system.force(&x);
     let mut residual = system.residual(&force);
-    let mut clamped_for = 0_usize;
+    let mut exactness: f64 = if residual < EXACT_BELOW { 1.0 } else { 0.0 };
     let mut centres = vec![centre(&x)];
     let mut status = RestStatus::IterationLimit;
     let mut iterations = 0;
@@ -119,17 +119,20 @@ pub fn find<S: Surface>(
             break;
         }
         iterations += 1;
-        let exact = residual < EXACT_BELOW && clamped_for == 0;
-        clamped_for = clamped_for.saturating_sub(1);
-        let Some(factor) = damped_factor(system, &x, sigma, !exact) else {
-            // An exact stiffness may be indefinite; a clamped one only by round-off.
-            if exact {
-                clamped_for = CLAMPED_FOR;
+        let Some(factor) = damped_factor(system, &x, sigma, exactness) else {
+            // Less exact is more definite; not exact at all it is indefinite only by round-off.
+            if exactness > 0.0 {
+                exactness = if exactness > LEAST_EXACTNESS {
+                    0.4 * exactness
+                } else {
+                    0.0
+                };
             } else {
                 sigma = 10.0 * sigma.max(1.0);
             }
             continue;
         };
+        let used = exactness;
         let mut direction = factor.solve(&force);
         let farthest = direction.iter().map(Vec3::norm).fold(0.0, f64::max);
         if !farthest.is_finite() {
@@ -148,9 +151,20 @@ pub fn find<S: Surface>(
             sigma = 10.0 * sigma.max(1.0);
             continue;
         };
+        if std::env::var("TRACE").is_ok() {
+            eprintln!(
+                "{iterations} r {residual:.3e} sigma {sigma:.2e} exact {used:.2} far {farthest:.4} frac {} E {:.8}",
+                step.fraction, step.energy
+            );
+        }
         x = step.x;
         force = step.force;
         residual = step.residual;
+        exactness = if residual < EXACT_BELOW {
+            (exactness + 0.25).min(1.0)
+        } else {
+            0.0
+        };
         energy = step.energy;
         if step.fraction < 1.0 {
             sigma *= 2.0;
@@ -179,9 +193,9 @@ fn damped_factor<S: Surface>(
     system: &System<'_, S>,
     x: &[Vec3],
     sigma: f64,
-    clamped: bool,
+    exactness: f64,
 ) -> Option<Factor> {
-    let mut k = system.stiffness(x, clamped);
+    let mut k = system.stiffness(x, exactness);
     k.add_diagonal(sigma, &system.rest.mass);
     k.factor()
 }

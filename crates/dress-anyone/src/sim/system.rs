@@ -124,14 +124,14 @@ impl<S: Surface> System<'_, S> {
         f
     }
 
-    /// K = ∂²U/∂x² \[N/m\]. `clamped` drops what can make an element indefinite: compressive
-    /// stress and contact curvature.
-    pub fn stiffness(&self, x: &[Vec3], clamped: bool) -> BlockMatrix {
+    /// K = ∂²U/∂x² \[N/m\], with the part `exactness` of what can make an element indefinite:
+    /// compressive stress and contact curvature. 1 is exact, 0 positive semi-definite.
+    pub fn stiffness(&self, x: &[Vec3], exactness: f64) -> BlockMatrix {
         let mut k = BlockMatrix::zeros(Arc::clone(&self.assembly.structure));
         for (e, t) in self.cloth.triangles.iter().enumerate() {
             let corners = t.map(|a| x[a as usize]);
             let rest = &self.rest.triangles[e];
-            let blocks = membrane::stiffness(rest, &self.cloth.elasticity, corners, clamped);
+            let blocks = membrane::stiffness(rest, &self.cloth.elasticity, corners, exactness);
             for (slot, (i, j)) in self.assembly.triangles[e].iter().zip(PAIRS) {
                 if t[i] >= t[j] {
                     k.add(*slot, &blocks[i][j]);
@@ -151,7 +151,7 @@ impl<S: Surface> System<'_, S> {
         }
         for (a, p) in x.iter().enumerate() {
             let h = self.contact.thickness;
-            if let Some(block) = contact::stiffness(self.surface, self.kappa(a), h, *p, clamped) {
+            if let Some(block) = contact::stiffness(self.surface, self.kappa(a), h, *p, exactness) {
                 k.add(self.assembly.vertices[a], &block);
             }
         }
@@ -221,7 +221,7 @@ mod tests {
 
         let slope = -dot(&system.force(&x), &d);
         assert_derivative(|s| system.energy(&at(s)), slope, 1e-6, 1e-3, 1e-6);
-        let kd = system.stiffness(&x, false).multiply(&d);
+        let kd = system.stiffness(&x, 1.0).multiply(&d);
         let q: Vec<Vec3> = (0..x.len())
             .map(|i| Vec3::from_fn(|c, _| noise(70 + 5 * i + c)))
             .collect();

@@ -77,19 +77,19 @@ pub fn force(surface: &impl Surface, kappa: f64, h: f64, p: Vec3) -> Vec3 {
     }
 }
 
-/// ∂²U/∂p² \[N/m\]; none where there is no contact. `clamped` drops the curvature term, which
-/// makes it positive semi-definite.
+/// ∂²U/∂p² \[N/m\]; none where there is no contact. With the part `curvature` of the curvature
+/// term: 1 is exact, 0 makes it positive semi-definite.
 pub fn stiffness(
     surface: &impl Surface,
     kappa: f64,
     h: f64,
     p: Vec3,
-    clamped: bool,
+    curvature: f64,
 ) -> Option<Mat3> {
     let (d, n) = surface.distance(p).filter(|(d, _)| *d < h)?;
     let mut k = n * n.transpose();
-    if !clamped {
-        k += surface.curvature(p) * (d - h);
+    if curvature > 0.0 {
+        k += surface.curvature(p) * (curvature * (d - h));
     }
     Some(k * kappa)
 }
@@ -185,7 +185,7 @@ mod tests {
         assert!(u(0.0) > 0.0, "the point must touch");
         let slope = -force(surface, kappa, h, p).dot(&d);
         assert_derivative(u, slope, 1e-5, 1e-3, 1e-7);
-        let k = stiffness(surface, kappa, h, p, false).expect("touches");
+        let k = stiffness(surface, kappa, h, p, 1.0).expect("touches");
         let g = |s: f64| -force(surface, kappa, h, p + d * s).dot(&q);
         assert_derivative(g, q.dot(&(k * d)), 1e-5, 1e-3, 1e-7);
     }

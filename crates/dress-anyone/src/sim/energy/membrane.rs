@@ -100,18 +100,19 @@ pub fn force(rest: &RestTriangle, d: &Elasticity, x: [Vec3; 3]) -> [Vec3; 3] {
     rest.gradients().map(|b| p * b)
 }
 
-/// ∂²U/∂x² \[N/m\], blocks `[a][b]` for b ≤ a. `clamped` drops the compressive part of the stress,
-/// which makes every element positive semi-definite.
+/// ∂²U/∂x² \[N/m\], blocks `[a][b]` for b ≤ a, with the part `compression` of the compressive
+/// stress: 1 is exact, 0 makes every element positive semi-definite.
 pub fn stiffness(
     rest: &RestTriangle,
     d: &Elasticity,
     x: [Vec3; 3],
-    clamped: bool,
+    compression: f64,
 ) -> [[Mat3; 3]; 3] {
     let f = rest.gradient_of(x);
     let mut s = d.stress(&green_strain(&f));
-    if clamped {
-        s = positive_part(&s);
+    if compression < 1.0 {
+        let tension = positive_part(&s);
+        s = tension + (s - tension) * compression;
     }
     let (fu, fv) = (f.column(0).into_owned(), f.column(1).into_owned());
     let (uu, vv, uv) = (
@@ -280,7 +281,7 @@ mod tests {
         for seed in 0..10 {
             let (x, d) = scene(100 * seed);
             let (_, q) = scene(100 * seed + 50);
-            let k = stiffness(&rest, &ANISOTROPIC, x, false);
+            let k = stiffness(&rest, &ANISOTROPIC, x, 1.0);
             let mut bilinear = 0.0;
             for a in 0..3 {
                 for b in 0..3 {
@@ -298,7 +299,7 @@ mod tests {
         let rest = RestTriangle::new(rest_corners());
         for seed in 0..50 {
             let (x, d) = scene(100 * seed);
-            let k = stiffness(&rest, &ANISOTROPIC, x, true);
+            let k = stiffness(&rest, &ANISOTROPIC, x, 0.0);
             let mut bilinear = 0.0;
             for a in 0..3 {
                 for b in 0..3 {
