@@ -35,6 +35,8 @@ pub struct Cloth {
     pub density: f64,
     /// Vertices kept near a height.
     pub holds: Vec<Hold>,
+    /// Cloth vertices of each triangle, right side in front.
+    pub outward: Vec<[u32; 3]>,
 }
 
 /// An edge of the welded mesh with a triangle on either side, as two pattern-space half hinges.
@@ -79,6 +81,7 @@ impl Cloth {
             bending: fabric.bending,
             density: fabric.density,
             holds: Vec::new(),
+            outward: mesh.outward_triangles(),
         }
     }
 

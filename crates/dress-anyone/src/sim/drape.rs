@@ -127,6 +127,9 @@ fn system<'a, S>(scene: &Scene<'a, S>, rest: &'a Rest) -> System<'a, S> {
     }
 }
 
+/// Part of the gathering time over which the inflation fades \[–\].
+const INFLATED: f64 = 0.7;
+
 /// XPBD from rest at `x` for the configured time.
 fn gather<S: Surface>(
     scene: &Scene<'_, S>,
@@ -149,7 +152,8 @@ fn gather<S: Surface>(
         if !observe(DrapeProgress::Gathering { step, steps }) {
             break;
         }
-        stepper.step(&mut state);
+        let left = 1.0 - step as f64 / (INFLATED * steps as f64);
+        stepper.step(&mut state, step_params.inflation * left.max(0.0));
     }
     state.x
 }
