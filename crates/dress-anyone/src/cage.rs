@@ -16,8 +16,8 @@ pub mod green;
 #[allow(clippy::unwrap_used)]
 mod tests;
 
-use crate::geometry::Vec2;
-use crate::geometry::plane::{complex, point};
+use crate::geometry::{Vec2, complex, point};
+
 use crate::pattern::symmetry::{Mirror, Reflection, Symmetry};
 use crate::pattern::{Pattern, PatternMesh};
 use crate::problem::Problem;

@@ -1,7 +1,8 @@
 //! Test-only: the GarmentCode designs of the shared data, read just well enough to draw cages
 //! around, and meshes without triangles.
 
-use crate::geometry::{Mat3, Vec2, Vec3};
+use crate::geometry::polygon::Polygon;
+use crate::geometry::{Mat3, Vec2, Vec3, bounds};
 use crate::pattern::{Curve, Edge, EdgeId, Panel, Pattern, PatternMesh, Placement, Stitch};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
@@ -32,13 +33,13 @@ pub(crate) fn sampled(pattern: &Pattern, spacing: f64) -> PatternMesh {
     for panel in &pattern.panels {
         let start = x_bar.len();
         let outline = panel.outline(spacing);
-        let high = outline.iter().fold(outline[0], |high, p| high.sup(p));
-        let low = outline.iter().fold(outline[0], |low, p| low.inf(p));
+        let (low, high) = bounds(&outline);
+        let inside = Polygon::new(outline.clone());
         let steps = ((high - low) / spacing).map(|s| s as usize);
         x_bar.extend(&outline);
         for i in 1..=steps.x {
             let column = (1..=steps.y).map(|j| low + Vec2::new(i as f64, j as f64) * spacing);
-            x_bar.extend(column.filter(|p| crate::geometry::plane::contains(&outline, *p)));
+            x_bar.extend(column.filter(|p| inside.contains(*p)));
         }
         panel_vertices.push(start..x_bar.len());
     }

@@ -4,7 +4,7 @@ use super::fixture::{panel, patterns, sampled};
 use super::*;
 use crate::check::noise;
 use crate::geometry::Vec3;
-use crate::geometry::plane::{contains, is_simple};
+use crate::geometry::polygon::{Polygon, is_simple};
 use nalgebra::{DMatrix, DVector};
 
 const SLEEVE: [(f64, f64); 5] = [
@@ -346,7 +346,8 @@ fn garmentcode_designs_deform_symmetrically_and_can_be_cut() {
         let drawn = cages.control_points(&rest);
         for ((cage, range), panel) in drawn.iter().zip(&mesh.panel_vertices).zip(&pattern.panels) {
             assert!(is_simple(cage), "{name} {}", panel.name);
-            let held = range.clone().all(|v| contains(cage, mesh.x_bar[v]));
+            let cage = Polygon::new(cage.clone());
+            let held = range.clone().all(|v| cage.contains(mesh.x_bar[v]));
             assert!(held, "{name} {}", panel.name);
         }
         let points: usize = drawn.iter().map(Vec::len).sum();

@@ -97,28 +97,3 @@ impl Problems {
         Err(self.shown)
     }
 }
-
-/// Things joined into groups (union–find).
-pub(crate) struct Groups(Vec<usize>);
-
-impl Groups {
-    /// Every one of `count` things on its own.
-    pub(crate) fn new(count: usize) -> Self {
-        Self((0..count).collect())
-    }
-
-    /// The group of thing `i`, named by its smallest member.
-    pub(crate) fn of(&mut self, mut i: usize) -> usize {
-        while self.0[i] != i {
-            self.0[i] = self.0[self.0[i]];
-            i = self.0[i];
-        }
-        i
-    }
-
-    /// Makes one group of the groups of `i` and `j`.
-    pub(crate) fn join(&mut self, i: usize, j: usize) {
-        let (i, j) = (self.of(i), self.of(j));
-        self.0[i.max(j)] = i.min(j);
-    }
-}

@@ -7,8 +7,7 @@
 
 mod congruence;
 
-use crate::geometry::plane::{complex, point};
-use crate::geometry::{Vec2, Vec3};
+use crate::geometry::{Vec2, Vec3, bounds, complex, point};
 use crate::pattern::{Pattern, PatternMesh};
 use congruence::{Fit, SHAPE_TOLERANCE, Shape};
 use num_complex::Complex64;
@@ -171,11 +170,7 @@ impl Reflection {
 
 /// Diagonal of the box around all placed panels \[m\].
 fn diagonal(shapes: &[Shape]) -> f64 {
-    let start = (Vec3::repeat(f64::INFINITY), Vec3::repeat(f64::NEG_INFINITY));
-    let (low, high) = shapes
-        .iter()
-        .flat_map(Shape::placed)
-        .fold(start, |(low, high), p| (low.inf(&p), high.sup(&p)));
+    let (low, high) = bounds(shapes.iter().flat_map(Shape::placed));
     (high - low).norm()
 }
 

@@ -6,6 +6,7 @@
 //! (dart legs, slits), not for a mistake.
 
 use super::{EdgeId, Panel, Pattern};
+use crate::geometry::polygon::{Crossing, Polygon, perimeter};
 use crate::geometry::{Vec2, signed_area};
 use crate::problem::Problem;
 use std::collections::{BTreeMap, BTreeSet};
@@ -167,13 +168,6 @@ struct Outline {
     edges: Vec<usize>,
 }
 
-/// Two sides of the polygon, in order, and the point where they cross.
-#[derive(Clone, Copy)]
-struct Crossing {
-    sides: (usize, usize),
-    point: Vec2,
-}
-
 impl Outline {
     fn new(panel: &Panel) -> Self {
         let (mut points, mut edges) = (Vec::new(), Vec::new());
@@ -190,10 +184,6 @@ impl Outline {
             }
         }
         Self { points, edges }
-    }
-
-    fn side(&self, i: usize) -> (Vec2, Vec2) {
-        (self.points[i], self.points[(i + 1) % self.points.len()])
     }
 
     fn area_problem(&self, panel: &Panel) -> Option<Problem> {
@@ -230,30 +220,10 @@ impl Outline {
         found.map(|(crossing, _)| pair(crossing)).collect()
     }
 
-    /// All proper crossings of sides that are not neighbours, in loop order.
+    /// Crossings of the loop with itself, in loop order.
     fn crossings(&self) -> Vec<Crossing> {
-        let n = self.points.len();
-        let low = |i: usize| self.side(i).0.x.min(self.side(i).1.x);
-        let high = |i: usize| self.side(i).0.x.max(self.side(i).1.x);
-        let mut order: Vec<usize> = (0..n).collect();
-        order.sort_by(|&i, &j| low(i).total_cmp(&low(j)));
-        let mut open: Vec<usize> = Vec::new();
-        let mut found = Vec::new();
-        for i in order {
-            open.retain(|&j| high(j) >= low(i));
-            for &j in &open {
-                let sides = (i.min(j), i.max(j));
-                let apart = sides.1 - sides.0;
-                if apart > 1 && apart < n - 1 {
-                    let point = crossing_point(self.side(sides.0), self.side(sides.1));
-                    found.extend(point.map(|point| Crossing { sides, point }));
-                }
-            }
-            open.push(i);
-            if found.len() > MANY {
-                break;
-            }
-        }
+        let polygon = Polygon::new(self.points.clone());
+        let mut found: Vec<_> = polygon.crossings().take(MANY).collect();
         found.sort_by_key(|crossing| crossing.sides);
         found
     }
@@ -285,26 +255,6 @@ impl Outline {
 /// Whether a loop is nowhere much wider than [`TOUCH`], judged by area over half the perimeter.
 fn is_sliver(polygon: &[Vec2]) -> bool {
     signed_area(polygon).abs() <= TOUCH * 0.5 * perimeter(polygon)
-}
-
-fn perimeter(polygon: &[Vec2]) -> f64 {
-    let next = polygon.iter().cycle().skip(1);
-    polygon.iter().zip(next).map(|(a, b)| (b - a).norm()).sum()
-}
-
-/// Where two segments cross, each passing from one side of the other to the other side.
-fn crossing_point((a, b): (Vec2, Vec2), (c, d): (Vec2, Vec2)) -> Option<Vec2> {
-    let turn = |p: Vec2, q: Vec2, r: Vec2| {
-        let coord = |v: Vec2| robust::Coord { x: v.x, y: v.y };
-        robust::orient2d(coord(p), coord(q), coord(r))
-    };
-    let opposite = |s: f64, t: f64| (s > 0.0 && t < 0.0) || (s < 0.0 && t > 0.0);
-    let (to_c, to_d) = (turn(a, b, c), turn(a, b, d));
-    if opposite(to_c, to_d) && opposite(turn(c, d, a), turn(c, d, b)) {
-        Some(c + (d - c) * (to_c / (to_c - to_d)))
-    } else {
-        None
-    }
 }
 
 #[cfg(test)]
