@@ -306,8 +306,8 @@ fn unfold(half: &[Vec2]) -> Vec<Vec2> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cage::fixture;
     use crate::cage::green::coordinates;
+    use crate::fixture::{named_pattern, shared};
     use crate::geometry::complex;
     use proptest::prelude::*;
 
@@ -456,7 +456,8 @@ mod tests {
 
     #[test]
     fn every_panel_of_the_garmentcode_designs_is_held() {
-        for (name, pattern) in fixture::patterns() {
+        for path in shared(&["garments/named", "garments/random"], "json") {
+            let (name, pattern) = named_pattern(&path);
             for panel in &pattern.panels {
                 let outline = panel.outline(0.005);
                 assert_holds(&outline, 12, &format!("{name} {}", panel.name));

@@ -260,4 +260,4 @@ fn assemble(pattern: &Pattern, panels: Vec<PanelMesh>) -> PatternMesh {
 
 #[cfg(test)]
 #[allow(clippy::unwrap_used)]
-mod tests;
+pub(super) mod tests;

@@ -260,29 +260,8 @@ fn is_sliver(polygon: &[Vec2]) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::{Mat3, Vec3};
-    use crate::pattern::{Curve, Edge, Placement, Stitch};
-
-    /// A panel with straight edges between `corners` \[m\].
-    fn polygon(corners: &[[f64; 2]]) -> Panel {
-        let n = corners.len();
-        let edge = |i| Edge {
-            start: i,
-            end: (i + 1) % n,
-            curve: Curve::Line,
-            label: None,
-        };
-        Panel {
-            name: "p".to_owned(),
-            vertices: corners.iter().map(|c| Vec2::from(*c)).collect(),
-            edges: (0..n).map(edge).collect(),
-            placement: Placement {
-                rotation: Mat3::identity(),
-                translation: Vec3::zeros(),
-            },
-            label: None,
-        }
-    }
+    use crate::fixture::{panel, stitch};
+    use crate::pattern::Curve;
 
     fn told(panel: &Panel) -> String {
         let told: Vec<_> = panel_problems(panel)
@@ -298,14 +277,14 @@ mod tests {
     fn a_square_with_a_dart_is_sound_either_way_round() {
         let mut dart = vec![[0.1, 0.0], [0.15, 0.1], [0.2, 0.0]];
         dart.extend([[0.3, 0.0], [0.3, 0.3], [0.0, 0.3], [0.0, 0.0]]);
-        assert_eq!(told(&polygon(&dart)), "");
+        assert_eq!(told(&panel("p", &dart)), "");
         dart.reverse();
-        assert_eq!(told(&polygon(&dart)), "");
+        assert_eq!(told(&panel("p", &dart)), "");
     }
 
     #[test]
     fn a_crossing_is_told_by_its_two_edges() {
-        let mut panel = polygon(&SQUARE);
+        let mut panel = panel("p", &SQUARE);
         // Both curves reach 10 cm past the middle.
         panel.edges[0].curve = Curve::Quadratic(Vec2::new(0.15, 0.5));
         panel.edges[2].curve = Curve::Quadratic(Vec2::new(0.15, -0.2));
@@ -316,7 +295,7 @@ mod tests {
 
     #[test]
     fn a_loop_within_one_edge_is_told() {
-        let mut panel = polygon(&SQUARE);
+        let mut panel = panel("p", &SQUARE);
         panel.edges[0].curve = Curve::Cubic([Vec2::new(0.9, -0.4), Vec2::new(-0.6, -0.4)]);
         assert_eq!(
             told(&panel),
@@ -327,7 +306,7 @@ mod tests {
     #[test]
     fn edges_that_overlap_by_less_than_a_pen_stroke_only_touch() {
         let overlapping_by = |depth: f64| {
-            let mut panel = polygon(&SQUARE);
+            let mut panel = panel("p", &SQUARE);
             // A parabola with its control point at height 2 h rises to h.
             panel.edges[0].curve = Curve::Quadratic(Vec2::new(0.15, 0.3 + depth));
             panel.edges[2].curve = Curve::Quadratic(Vec2::new(0.15, -depth));
@@ -342,35 +321,30 @@ mod tests {
     fn a_slit_of_no_width_is_allowed_and_a_panel_of_no_width_is_not() {
         let mut slit = vec![[0.15, 0.0], [0.15, 0.1], [0.15 + 1e-5, 0.0]];
         slit.extend([[0.3, 0.0], [0.3, 0.3], [0.0, 0.3], [0.0, 0.0]]);
-        assert_eq!(told(&polygon(&slit)), "");
-        let strip = polygon(&[[0.0, 0.0], [0.3, 0.0], [0.3, 1e-5], [0.0, 1e-5]]);
+        assert_eq!(told(&panel("p", &slit)), "");
+        let strip = panel("p", &[[0.0, 0.0], [0.3, 0.0], [0.3, 1e-5], [0.0, 1e-5]]);
         assert!(told(&strip).contains("encloses no area"));
     }
 
     #[test]
     fn a_corner_passed_twice_and_a_position_that_is_no_number_are_told() {
-        let mut eight = polygon(&[[0.0, 0.0], [0.1, 0.1], [0.2, 0.0], [0.2, 0.2]]);
+        let mut eight = panel("p", &[[0.0, 0.0], [0.1, 0.1], [0.2, 0.0], [0.2, 0.2]]);
         eight.edges[2].end = 1;
         eight.edges[3].start = 1;
         assert!(told(&eight).contains("passes corner 1 a second time"));
-        let mut nowhere = polygon(&SQUARE);
+        let mut nowhere = panel("p", &SQUARE);
         nowhere.vertices[2].x = f64::NAN;
         assert!(told(&nowhere).contains("edge 1: starts and ends at the same point"));
     }
 
     #[test]
     fn a_stitch_that_names_nothing_or_something_sewn_is_told() {
-        let side = |panel, edge| EdgeId { panel, edge };
-        let stitch = |sides| Stitch {
-            sides,
-            right_wrong: false,
-        };
         let pattern = Pattern {
-            panels: vec![polygon(&SQUARE)],
+            panels: vec![panel("p", &SQUARE)],
             stitches: vec![
-                stitch([side(0, 0), side(0, 1)]),
-                stitch([side(0, 1), side(0, 4)]),
-                stitch([side(1, 0), side(0, 2)]),
+                stitch((0, 0), (0, 1)),
+                stitch((0, 1), (0, 4)),
+                stitch((1, 0), (0, 2)),
             ],
         };
         let told: Vec<_> = problems(&pattern).iter().map(|p| p.place.clone()).collect();
