@@ -50,6 +50,15 @@ pub(crate) fn named_pattern(path: &Path) -> (String, Pattern) {
     (name, read.unwrap_or_else(|error| panic!("{error}")).pattern)
 }
 
+/// Corners of a lopsided sleeve \[m\], which does not mirror itself.
+pub(crate) const SLEEVE: [(f64, f64); 5] = [
+    (0.0, 0.0),
+    (0.2, 0.0),
+    (0.3, 0.42),
+    (0.1, 0.52),
+    (-0.05, 0.4),
+];
+
 /// A panel of straight edges through `corners` \[m\], waiting at the origin.
 pub(crate) fn panel(name: &str, corners: &[impl Copy + Into<[f64; 2]>]) -> Panel {
     panel_at(name, corners, Vec3::zeros())

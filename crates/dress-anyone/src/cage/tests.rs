@@ -2,18 +2,11 @@
 
 use super::*;
 use crate::check::noise;
-use crate::fixture::{named_pattern, panel, panel_at, sampled, shared};
+use crate::fixture::{SLEEVE, named_pattern, panel, panel_at, sampled, shared};
 use crate::geometry::Vec3;
 use crate::geometry::polygon::{Polygon, is_simple};
 use nalgebra::{DMatrix, DVector};
 
-const SLEEVE: [(f64, f64); 5] = [
-    (0.0, 0.0),
-    (0.2, 0.0),
-    (0.3, 0.42),
-    (0.1, 0.52),
-    (-0.05, 0.4),
-];
 const FRONT: [(f64, f64); 6] = [
     (-0.25, 0.0),
     (0.25, 0.0),

@@ -215,18 +215,9 @@ impl Seams {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fixture::{named_pattern, panel, panel_at, sampled, shared, stitch};
+    use crate::fixture::{SLEEVE, named_pattern, panel, panel_at, sampled, shared, stitch};
     use crate::pattern::{Panel, Stitch};
     use approx::assert_relative_eq;
-
-    /// A lopsided sleeve, and its mirror image in the y axis, shifted.
-    const SLEEVE: [(f64, f64); 5] = [
-        (0.0, 0.0),
-        (0.2, 0.0),
-        (0.3, 0.42),
-        (0.1, 0.52),
-        (-0.05, 0.4),
-    ];
 
     fn mirrored(corners: &[(f64, f64)], shift: f64) -> Vec<(f64, f64)> {
         corners.iter().rev().map(|(x, y)| (shift - x, *y)).collect()

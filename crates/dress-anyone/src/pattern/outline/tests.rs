@@ -341,7 +341,10 @@ proptest! {
             let t = f64::from(i) / 10.0;
             let here = curve.point(points[0], points[n], t);
             let there = other.point(mirrored[0], mirrored[n], 1.0 - t);
-            prop_assert!((mirror(here) - there).norm() < 1e-9);
+            // A few points hardly hold a cubic: along what they leave free (the least damping is
+            // 1e-7) round-off grows, though the residual does not.
+            let apart = (mirror(here) - there).norm();
+            prop_assert!(apart < 1e-6, "{apart:e}");
         }
     }
 }
