@@ -2,22 +2,18 @@
 //!
 //! `x̄ = x̄₀ + W (ζ − ζ₀)` with one constant real matrix W: Green coordinates are linear in the control
 //! points. They are conformal, so they cannot widen a panel without lengthening it; by default each
-//! panel gets one more complex unknown β that adds `β·conj(z − z_c)`, a uniform stretch and shear
-//!. Symmetry is in the unknowns: of a mirror pair only the first panel has any, the
+//! panel gets one more complex unknown β that adds `β·conj(z − z_c)`, a uniform stretch and shear.
+//! Symmetry is in the unknowns: of a mirror pair only the first panel has any, the
 //! second moves as its mirror image, so that no step can break it.
 
 mod control;
 pub mod enclose;
-#[cfg(test)]
-#[allow(clippy::unwrap_used)]
-pub(crate) mod fixture;
 pub mod green;
 #[cfg(test)]
 #[allow(clippy::unwrap_used)]
 mod tests;
 
-use crate::geometry::Vec2;
-use crate::geometry::plane::{complex, point};
+use crate::geometry::{Vec2, complex, point};
 use crate::pattern::symmetry::{Mirror, Reflection, Symmetry};
 use crate::pattern::{Pattern, PatternMesh};
 use crate::problem::Problem;

@@ -16,7 +16,7 @@ pub mod symmetry;
 pub mod triangulate;
 pub mod validate;
 
-use crate::geometry::{Mat3, Vec2, Vec3};
+use crate::geometry::{Mat3, Vec2, Vec3, bounds};
 pub use curve::Curve;
 pub use mesh::PatternMesh;
 
@@ -127,11 +127,7 @@ impl Panel {
 
     /// Diagonal of the box around the corners \[m\].
     pub fn extent(&self) -> f64 {
-        let start = (Vec2::repeat(f64::INFINITY), Vec2::repeat(f64::NEG_INFINITY));
-        let (low, high) = self
-            .vertices
-            .iter()
-            .fold(start, |(low, high), p| (low.inf(p), high.sup(p)));
+        let (low, high) = bounds(&self.vertices);
         (high - low).norm()
     }
 }

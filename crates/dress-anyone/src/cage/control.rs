@@ -6,8 +6,8 @@
 //! handle β' = ρβ \[m\], ρ being the panel's size. A mirrored panel moves by `u·conj(d)`.
 
 use super::green;
-use crate::geometry::Vec2;
-use crate::geometry::plane::{centroid, complex, is_simple, perimeter, point, sides};
+use crate::geometry::polygon::{centroid, is_simple, perimeter, sides};
+use crate::geometry::{Vec2, complex, point};
 use crate::pattern::symmetry::Reflection;
 use num_complex::Complex64;
 

@@ -8,10 +8,10 @@
 //! Several outlines are held by one cage: a panel and its mirrored partner need the same cage. With
 //! `mirrored` the cage is its own mirror image in the y axis, to the last bit.
 
-use crate::geometry::plane::{
-    centroid, contains, distance_of_segments, distance_to_segment, is_simple, perimeter, sides,
+use crate::geometry::polygon::{
+    Polygon, centroid, distance_of_segments, distance_to_segment, is_simple, perimeter, sides,
 };
-use crate::geometry::{Vec2, signed_area};
+use crate::geometry::{Vec2, bounds, signed_area};
 
 /// Fewest control points of a cage: with fewer, a rectangle cannot bow its sides.
 pub const FEWEST_POINTS: usize = 8;
@@ -157,9 +157,10 @@ impl Drawing {
 
     /// Whether `cage` is simple, counter-clockwise, and holds the outlines with room to spare.
     fn holds(&self, cage: &[Vec2]) -> bool {
+        let inside = Polygon::new(cage.to_vec());
         signed_area(cage) > 0.0
             && is_simple(cage)
-            && self.outlines.iter().all(|o| contains(cage, o[0]))
+            && self.outlines.iter().all(|o| inside.contains(o[0]))
             && sides(cage).all(|side| self.clearance(side) >= CLEARANCE * self.delta)
     }
 }
@@ -175,9 +176,7 @@ struct Field {
 
 impl Field {
     fn around(outlines: &[Vec<Vec2>], delta: f64) -> Self {
-        let start = (Vec2::repeat(f64::INFINITY), Vec2::repeat(f64::NEG_INFINITY));
-        let all = outlines.iter().flatten();
-        let (low, high) = all.fold(start, |(low, high), p| (low.inf(p), high.sup(p)));
+        let (low, high) = bounds(outlines.iter().flatten());
         let step = delta / CELLS;
         let reach = 1.5 * delta;
         let half = [0, 1].map(|i| ((0.5 * (high[i] - low[i]) + reach) / step).ceil() as i64 + 1);
@@ -307,9 +306,9 @@ fn unfold(half: &[Vec2]) -> Vec<Vec2> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cage::fixture;
     use crate::cage::green::coordinates;
-    use crate::geometry::plane::complex;
+    use crate::fixture::{named_pattern, shared};
+    use crate::geometry::complex;
     use proptest::prelude::*;
 
     /// Everything a cage promises.
@@ -319,10 +318,7 @@ mod tests {
         assert!(is_simple(&cage), "{what}: the cage crosses itself");
         let n = cage.len();
         assert!((8..=3 * points).contains(&n), "{what}: {n} points");
-        assert!(
-            outline.iter().all(|p| contains(&cage, *p)),
-            "{what}: sticks out"
-        );
+        assert!(all_inside(&cage, outline), "{what}: sticks out");
         let distance = sides(&cage)
             .flat_map(|s| sides(outline).map(move |t| distance_of_segments(s, t)))
             .fold(f64::INFINITY, f64::min);
@@ -334,6 +330,11 @@ mod tests {
         );
         assert_reproduces(&cage, outline);
         cage
+    }
+
+    fn all_inside(cage: &[Vec2], points: &[Vec2]) -> bool {
+        let cage = Polygon::new(cage.to_vec());
+        points.iter().all(|p| cage.contains(*p))
     }
 
     /// Coordinates reproduce the panel's own points to round-off.
@@ -390,7 +391,7 @@ mod tests {
         ]);
         let cage = assert_holds(&u, 16, "u");
         assert!(
-            !contains(&cage, Vec2::new(0.3, 0.4)),
+            !all_inside(&cage, &[Vec2::new(0.3, 0.4)]),
             "the legs are not tied together"
         );
     }
@@ -406,7 +407,7 @@ mod tests {
         for j in 1..n {
             assert_eq!((cage[j].x, cage[j].y), (-cage[n - j].x, cage[n - j].y));
         }
-        assert!(is_simple(&cage) && outline.iter().all(|p| contains(&cage, *p)));
+        assert!(is_simple(&cage) && all_inside(&cage, &outline));
         assert_reproduces(&cage, &outline);
     }
 
@@ -455,7 +456,8 @@ mod tests {
 
     #[test]
     fn every_panel_of_the_garmentcode_designs_is_held() {
-        for (name, pattern) in fixture::patterns() {
+        for path in shared(&["garments/named", "garments/random"], "json") {
+            let (name, pattern) = named_pattern(&path);
             for panel in &pattern.panels {
                 let outline = panel.outline(0.005);
                 assert_holds(&outline, 12, &format!("{name} {}", panel.name));

@@ -1,19 +1,12 @@
 //! What the cages of a whole pattern promise.
 
-use super::fixture::{panel, patterns, sampled};
 use super::*;
 use crate::check::noise;
+use crate::fixture::{SLEEVE, named_pattern, panel, panel_at, sampled, shared};
 use crate::geometry::Vec3;
-use crate::geometry::plane::{contains, is_simple};
+use crate::geometry::polygon::{Polygon, is_simple};
 use nalgebra::{DMatrix, DVector};
 
-const SLEEVE: [(f64, f64); 5] = [
-    (0.0, 0.0),
-    (0.2, 0.0),
-    (0.3, 0.42),
-    (0.1, 0.52),
-    (-0.05, 0.4),
-];
 const FRONT: [(f64, f64); 6] = [
     (-0.25, 0.0),
     (0.25, 0.0),
@@ -26,7 +19,7 @@ const FRONT: [(f64, f64); 6] = [
 /// A front that mirrors itself about a slanted axis, a pair of sleeves, and a patch.
 fn garment() -> (Pattern, PatternMesh, Symmetry) {
     let turned = |(x, y): &(f64, f64)| (0.8 * x - 0.6 * y + 0.3, 0.6 * x + 0.8 * y);
-    let mut front = panel(
+    let mut front = panel_at(
         "front",
         &FRONT.map(|p| turned(&p)),
         Vec3::new(-0.24, 1.0, 0.1),
@@ -37,9 +30,9 @@ fn garment() -> (Pattern, PatternMesh, Symmetry) {
     let pattern = Pattern {
         panels: vec![
             front,
-            panel("left", &SLEEVE, Vec3::new(0.4, 1.0, 0.0)),
-            panel("right", &mirrored, Vec3::new(-1.1, 1.0, 0.0)),
-            panel(
+            panel_at("left", &SLEEVE, Vec3::new(0.4, 1.0, 0.0)),
+            panel_at("right", &mirrored, Vec3::new(-1.1, 1.0, 0.0)),
+            panel_at(
                 "patch",
                 &[(0.0, 0.0), (0.1, 0.0), (0.05, 0.12)],
                 Vec3::new(0.1, 1.2, 0.2),
@@ -222,7 +215,7 @@ fn any_unknowns_give_a_symmetric_pattern() {
 fn only_an_affine_part_widens_a_panel_at_equal_length() {
     let corners = [(0.0, 0.0), (0.5, 0.0), (0.5, 0.7), (0.0, 0.7)];
     let pattern = Pattern {
-        panels: vec![panel("rectangle", &corners, Vec3::zeros())],
+        panels: vec![panel("rectangle", &corners)],
         stitches: vec![],
     };
     let mesh = sampled(&pattern, 0.0199);
@@ -293,10 +286,7 @@ fn a_folded_or_crossing_pattern_is_rejected() {
 fn all_problems_are_told_at_once() {
     let flat = [(0.0, 0.0), (0.1, 0.0), (0.2, 0.0)];
     let pattern = Pattern {
-        panels: vec![
-            panel("a", &flat, Vec3::zeros()),
-            panel("b", &flat, Vec3::zeros()),
-        ],
+        panels: vec![panel("a", &flat), panel("b", &flat)],
         stitches: vec![],
     };
     let mesh = sampled(&pattern, 0.05);
@@ -334,7 +324,8 @@ fn parameters_are_spelt_in_kebab_case_and_misspelt_ones_refused() {
 
 #[test]
 fn garmentcode_designs_deform_symmetrically_and_can_be_cut() {
-    for (name, pattern) in patterns() {
+    for path in shared(&["garments/named", "garments/random"], "json") {
+        let (name, pattern) = named_pattern(&path);
         let mesh = sampled(&pattern, 0.03);
         let symmetry = Symmetry::detect(&pattern, &mesh, None);
         let cages = Cages::enclose(&pattern, &mesh, Some(&symmetry), &CageParams::default());
@@ -346,7 +337,8 @@ fn garmentcode_designs_deform_symmetrically_and_can_be_cut() {
         let drawn = cages.control_points(&rest);
         for ((cage, range), panel) in drawn.iter().zip(&mesh.panel_vertices).zip(&pattern.panels) {
             assert!(is_simple(cage), "{name} {}", panel.name);
-            let held = range.clone().all(|v| contains(cage, mesh.x_bar[v]));
+            let cage = Polygon::new(cage.clone());
+            let held = range.clone().all(|v| cage.contains(mesh.x_bar[v]));
             assert!(held, "{name} {}", panel.name);
         }
         let points: usize = drawn.iter().map(Vec::len).sum();

@@ -5,8 +5,7 @@
 //! Built by median splits along the longest axis, ties broken by index, so the same triangles give
 //! the same tree. Nodes lie in one flat array, depth first: the left child of node i is i + 1.
 
-use super::Vec3;
-use super::mesh::bounds;
+use super::{Vec3, bounds};
 
 /// A volume tree over triangles known by their index.
 #[derive(Clone, Debug, PartialEq)]

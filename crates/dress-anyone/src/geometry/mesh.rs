@@ -1,6 +1,7 @@
 //! A triangle mesh in space and its vertex normals.
 
 use super::Vec3;
+pub use super::bounds;
 
 /// Positions and triangles; triangles are counter-clockwise seen from outside.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -26,14 +27,6 @@ impl TriangleMesh {
     pub fn vertex_normals(&self) -> Vec<Vec3> {
         vertex_normals(&self.positions, &self.triangles)
     }
-}
-
-/// Smallest and largest corner of the box around `points`; infinite and reversed when empty.
-pub fn bounds(points: &[Vec3]) -> (Vec3, Vec3) {
-    let start = (Vec3::repeat(f64::INFINITY), Vec3::repeat(f64::NEG_INFINITY));
-    points
-        .iter()
-        .fold(start, |(low, high), p| (low.inf(p), high.sup(p)))
 }
 
 /// Unit normals per vertex, area-weighted; zero where a vertex has no triangle.

@@ -3,6 +3,7 @@
 //! A lid is a fan around the mean of its rim. Rims are the directed edges walked once more often
 //! forth than back; at every vertex as many of them leave as arrive, so following them always closes.
 
+use super::groups::Groups;
 use super::{TriangleMesh, Vec3};
 use std::collections::BTreeMap;
 
@@ -77,22 +78,13 @@ fn turn_outside_out(solid: &mut TriangleMesh) {
 
 /// The lowest vertex connected to each vertex.
 fn components(vertex_count: usize, triangles: &[[u32; 3]]) -> Vec<u32> {
-    fn root(parent: &mut [u32], mut v: u32) -> u32 {
-        while parent[v as usize] != v {
-            parent[v as usize] = parent[parent[v as usize] as usize];
-            v = parent[v as usize];
-        }
-        v
-    }
-    let mut parent: Vec<u32> = (0..vertex_count as u32).collect();
+    let mut groups = Groups::new(vertex_count);
     for &[a, b, c] in triangles {
-        for v in [b, c] {
-            let (i, j) = (root(&mut parent, a), root(&mut parent, v));
-            parent[i.max(j) as usize] = i.min(j);
-        }
+        groups.join([a, b]);
+        groups.join([a, c]);
     }
     (0..vertex_count as u32)
-        .map(|v| root(&mut parent, v))
+        .map(|v| groups.first_of(v))
         .collect()
 }
 

@@ -10,10 +10,9 @@
 mod surface;
 
 use super::source::{self, Surface};
-use super::{obj, ply, stl};
+use super::{kind, obj, ply, stl};
 use crate::body::{Body, FileFrame, UpAxis};
-use crate::geometry::mesh::bounds;
-use crate::geometry::{TriangleMesh, Vec3};
+use crate::geometry::{TriangleMesh, Vec3, bounds};
 use crate::problem::{BadInput, Problem};
 use std::fmt::Write as _;
 use std::path::Path;
@@ -63,43 +62,24 @@ const POSSIBLE_HEIGHT: std::ops::RangeInclusive<f64> = 0.4..=3.0;
 
 /// Reads by what the content is; the extension only helps to say what is wrong with it.
 fn surface_of(bytes: &[u8], path: &Path) -> Result<Surface, Vec<Problem>> {
-    let extension = path
+    let named_stl = path
         .extension()
-        .unwrap_or_default()
-        .to_string_lossy()
-        .to_lowercase();
-    if let Some(what) = foreign(bytes) {
-        let text = format!("{what}; a body is read from an OBJ, PLY or STL mesh");
-        return Err(vec![Problem::whole(text)]);
+        .is_some_and(|extension| extension.eq_ignore_ascii_case("stl"));
+    match kind::of(bytes) {
+        Some(kind::PLY) => ply::parse(bytes),
+        Some(kind::STL) => stl::parse(bytes),
+        None if named_stl => stl::parse(bytes),
+        None | Some(kind::OBJ) => obj::parse(bytes).map(obj::Document::into_surface),
+        Some(other) => {
+            let swapped = match other {
+                kind::JSON | kind::XML => ", perhaps a garment's pattern given in the body's place",
+                _ => "",
+            };
+            Err(vec![Problem::whole(format!(
+                "this looks like {other}{swapped}; a body is read from an OBJ, PLY or STL mesh"
+            ))])
+        }
     }
-    let start = bytes.trim_ascii_start();
-    if start.starts_with(b"ply") {
-        ply::parse(bytes)
-    } else if stl::is_binary(bytes) || start.starts_with(b"solid") || extension == "stl" {
-        stl::parse(bytes)
-    } else {
-        obj::parse(bytes).map(obj::Document::into_surface)
-    }
-}
-
-/// What a file is that cannot be a body.
-fn foreign(bytes: &[u8]) -> Option<&'static str> {
-    let start = bytes.trim_ascii_start();
-    let known: [(&[u8], &str); 5] = [
-        (
-            b"{",
-            "this is JSON, perhaps a garment's pattern given in the body's place",
-        ),
-        (b"PK\x03\x04", "this is a zip archive (npz?), not a mesh"),
-        (b"glTF", "this is glTF: export the body as OBJ"),
-        (b"Kaydara FBX", "this is FBX: export the body as OBJ"),
-        (
-            b"<",
-            "this is XML or SVG, perhaps a pattern given in the body's place",
-        ),
-    ];
-    let found = known.iter().find(|(magic, _)| start.starts_with(magic));
-    found.map(|(_, what)| *what)
 }
 
 /// Brings a surface to metres, y up, outside out; with notes on how.

@@ -8,6 +8,7 @@
 mod layout;
 mod seams;
 
+use crate::geometry::polygon::centroid;
 use crate::geometry::{Vec2, signed_area};
 use crate::pattern::{Curve, Panel, Pattern};
 pub use layout::shelves;
@@ -308,25 +309,6 @@ fn escaped(text: &str) -> String {
         }
     }
     safe
-}
-
-/// Centroid of a polygon's area; the mean of its corners when it has none.
-fn centroid(polygon: &[Vec2]) -> Vec2 {
-    let Some(&origin) = polygon.first() else {
-        return Vec2::zeros();
-    };
-    let (mut moment, mut doubled) = (Vec2::zeros(), 0.0);
-    for (a, b) in polygon.iter().zip(polygon.iter().cycle().skip(1)) {
-        let (a, b) = (a - origin, b - origin);
-        let cross = crate::geometry::cross2(a, b);
-        moment += (a + b) * cross;
-        doubled += cross;
-    }
-    if doubled.abs() > 1e-12 {
-        origin + moment / (3.0 * doubled)
-    } else {
-        polygon.iter().sum::<Vec2>() / polygon.len() as f64
-    }
 }
 
 #[cfg(test)]

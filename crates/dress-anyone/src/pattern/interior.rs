@@ -7,8 +7,9 @@
 //! triangles are improved one vertex at a time. Where the outline is sampled more finely than the
 //! rest, sizes grow inwards from it at a fixed rate.
 
+use crate::geometry::polygon::Polygon;
 use crate::geometry::quality::quality;
-use crate::geometry::{Vec2, cross2, polygon::Polygon};
+use crate::geometry::{Vec2, bounds, cross2};
 use spade::{ConstrainedDelaunayTriangulation, Point2, Triangulation};
 
 /// Rounds of smoothing; quality gains less than 0.001 from more.
@@ -332,13 +333,6 @@ impl Sizes {
         let rows = self.squares.len() / self.columns;
         (cell.x.min(self.columns - 1), cell.y.min(rows - 1))
     }
-}
-
-fn bounds(points: &[Vec2]) -> (Vec2, Vec2) {
-    let start = (Vec2::repeat(f64::INFINITY), Vec2::repeat(f64::NEG_INFINITY));
-    points
-        .iter()
-        .fold(start, |(low, high), p| (low.inf(p), high.sup(p)))
 }
 
 fn sides([a, b, c]: &[u32; 3]) -> [[u32; 2]; 3] {

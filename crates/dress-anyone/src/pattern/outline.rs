@@ -10,6 +10,7 @@ mod fit;
 
 use super::{Curve, Pattern, PatternMesh, curve};
 use crate::geometry::Vec2;
+use crate::geometry::polygon::distance_to_segment;
 pub use conform::conform;
 
 /// How far a written curve may leave the deformed edge before its kind is changed \[m\]; half a
@@ -129,7 +130,7 @@ fn bulges(source: &Curve, (a, b): (Vec2, Vec2), points: &[Vec2]) -> Vec<f64> {
     };
     let bulge = |k: usize| {
         let (from, middle, to) = (halves[2 * k], halves[2 * k + 1], halves[2 * k + 2]);
-        let before = fit::distance_to_segment(middle, from, to);
+        let before = distance_to_segment(middle, (from, to));
         let growth = (points[k + 1] - points[k]).norm() / (to - from).norm();
         let scaled = if growth.is_finite() {
             before * growth.max(1.0)

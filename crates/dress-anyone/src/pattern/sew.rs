@@ -6,6 +6,7 @@
 
 use super::{EdgeId, Pattern, PatternMesh};
 use crate::geometry::Vec2;
+use crate::geometry::groups::Groups;
 use crate::problem::Problem;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -149,30 +150,4 @@ pub(super) fn place(pattern: &Pattern, id: EdgeId) -> String {
 /// "(12.3, 4.0) cm".
 pub(super) fn centimetres(p: Vec2) -> String {
     format!("({:.1}, {:.1}) cm", 100.0 * p.x, 100.0 * p.y)
-}
-
-/// Union–find; a group is known by its least member.
-pub(super) struct Groups(Vec<u32>);
-
-impl Groups {
-    /// Every one of `count` alone.
-    pub(super) fn new(count: usize) -> Self {
-        Self((0..count as u32).collect())
-    }
-
-    /// Joins the groups of two members.
-    pub(super) fn join(&mut self, [a, b]: [u32; 2]) {
-        let (a, b) = (self.first_of(a), self.first_of(b));
-        self.0[a.max(b) as usize] = a.min(b);
-    }
-
-    /// The least member of the group of `v`.
-    pub(super) fn first_of(&mut self, mut v: u32) -> u32 {
-        while self.0[v as usize] != v {
-            let up = self.0[self.0[v as usize] as usize];
-            self.0[v as usize] = up;
-            v = up;
-        }
-        v
-    }
 }

@@ -2,127 +2,13 @@
 //!
 //! The qualities reached are printed (`cargo test shared_garments -- --nocapture`).
 
-use super::curve::Curve;
 use super::triangulate::mesh;
-use super::{Edge, EdgeId, Panel, Pattern, PatternMesh, Placement, Stitch};
+use super::triangulate::tests::inner_points;
+use super::{Pattern, PatternMesh};
+use crate::fixture::{GARMENTS, named_pattern, own, shared};
 use crate::geometry::quality::{QualitySummary, qualities};
-use crate::geometry::{TriangleMesh, Vec2, Vec3};
-use nalgebra::Rotation3;
-use serde_json::Value;
-use std::path::{Path, PathBuf};
-
-/// Every `.json` below the shared garments; none, with a word, where there are no shared data.
-fn shared_garments() -> Vec<PathBuf> {
-    let root = std::env::var_os("DRESS_SHARED").map_or_else(
-        || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared"),
-        PathBuf::from,
-    );
-    let mut files = Vec::new();
-    let mut folders = vec![root.join("data/garments")];
-    while let Some(folder) = folders.pop() {
-        for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
-            let path = entry.path();
-            if path.is_dir() {
-                folders.push(path);
-            } else if path.extension().is_some_and(|e| e == "json") {
-                files.push(path);
-            }
-        }
-    }
-    if files.is_empty() {
-        println!("skipped: no shared garments");
-    }
-    files.sort();
-    files
-}
-
-/// As much of the format as these files need.
-fn read(path: &Path) -> Option<Pattern> {
-    let file: Value = serde_json::from_str(&std::fs::read_to_string(path).ok()?).ok()?;
-    let scale = 1.0 / file["properties"]["units_in_meter"].as_f64()?;
-    let vec2 = |v: &Value| Some(Vec2::new(v[0].as_f64()?, v[1].as_f64()?));
-    let vec3 = |v: &Value| Some(Vec3::new(v[0].as_f64()?, v[1].as_f64()?, v[2].as_f64()?));
-    let panels = file["pattern"]["panels"].as_object()?;
-    let read_panel = |(name, panel): (&String, &Value)| {
-        let vertices: Vec<Vec2> = panel["vertices"]
-            .as_array()?
-            .iter()
-            .map(|v| vec2(v).map(|p| p * scale))
-            .collect::<Option<_>>()?;
-        let read_edge = |edge: &Value| {
-            let start = edge["endpoints"][0].as_u64()? as usize;
-            let end = edge["endpoints"][1].as_u64()? as usize;
-            let (a, b) = (vertices[start], vertices[end]);
-            let control = |v: &Value| {
-                let (c, along) = (vec2(v)?, b - a);
-                Some(a + along * c.x + Vec2::new(-along.y, along.x) * c.y)
-            };
-            let curvature = &edge["curvature"];
-            let params = &curvature["params"];
-            let curve = match curvature["type"].as_str() {
-                None if curvature.is_null() => Curve::Line,
-                None => Curve::Quadratic(control(curvature)?),
-                Some("quadratic") => Curve::Quadratic(control(&params[0])?),
-                Some("cubic") => Curve::Cubic([control(&params[0])?, control(&params[1])?]),
-                _ => Curve::Arc {
-                    radius: params[0].as_f64()? * scale,
-                    large: params[1].as_f64()? > 0.5,
-                    counter_clockwise: params[2].as_f64()? > 0.5,
-                },
-            };
-            Some(Edge {
-                start,
-                end,
-                curve,
-                label: None,
-            })
-        };
-        Some(Panel {
-            name: name.clone(),
-            edges: panel["edges"]
-                .as_array()?
-                .iter()
-                .map(read_edge)
-                .collect::<Option<_>>()?,
-            vertices,
-            placement: Placement {
-                rotation: {
-                    let [x, y, z] = vec3(&panel["rotation"])?.into();
-                    *Rotation3::from_euler_angles(
-                        f64::to_radians(x),
-                        f64::to_radians(y),
-                        f64::to_radians(z),
-                    )
-                    .matrix()
-                },
-                translation: vec3(&panel["translation"])? * scale,
-            },
-            label: None,
-        })
-    };
-    let side = |v: &Value| {
-        Some(EdgeId {
-            panel: panels
-                .keys()
-                .position(|name| Some(name.as_str()) == v["panel"].as_str())?,
-            edge: v["edge"].as_u64()? as usize,
-        })
-    };
-    let read_stitch = |stitch: &Value| {
-        Some(Stitch {
-            sides: [side(&stitch[0])?, side(&stitch[1])?],
-            right_wrong: stitch[2] == "right_wrong",
-        })
-    };
-    Some(Pattern {
-        panels: panels.iter().map(read_panel).collect::<Option<_>>()?,
-        stitches: file["pattern"]["stitches"]
-            .as_array()?
-            .iter()
-            .map(read_stitch)
-            .collect::<Option<_>>()?,
-    })
-}
+use crate::geometry::{ClosestPoint, Vec2};
+use crate::io::{self, body::BodyOptions};
 
 /// Vertices − edges + faces, and how many triangles each edge has at most.
 fn topology(vertex_count: usize, triangles: &[[u32; 3]]) -> (isize, usize) {
@@ -186,9 +72,8 @@ fn every_shared_garment_welds_at_ten_millimetres() {
 
 fn weld_all(resolution: f64) {
     let mut all = Vec::new();
-    for file in shared_garments() {
-        let name = file.file_stem().unwrap().to_string_lossy().into_owned();
-        let pattern = read(&file).unwrap();
+    for file in shared(&GARMENTS, "json") {
+        let (name, pattern) = named_pattern(&file);
         let start = std::time::Instant::now();
         let mesh =
             mesh(&pattern, resolution).unwrap_or_else(|problems| panic!("{name}: {}", problems[0]));
@@ -213,16 +98,9 @@ fn weld_all(resolution: f64) {
     }
 }
 
-/// A file of the project's own data.
-fn own(path: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("../../data")
-        .join(path)
-}
-
 #[test]
 fn the_embedded_t_shirt_has_four_openings_and_seams_of_equal_length() {
-    let pattern = read(&own("garments/tshirt.json")).unwrap();
+    let (_, pattern) = named_pattern(&own("garments/tshirt.json"));
     let mesh = mesh(&pattern, 0.012).unwrap();
     let quality = check("tshirt", &pattern, &mesh);
     println!("{} vertices, {quality:?}", mesh.x_bar.len());
@@ -239,22 +117,9 @@ fn the_embedded_t_shirt_has_four_openings_and_seams_of_equal_length() {
 
 #[test]
 fn the_flat_t_shirt_surrounds_its_body_without_touching_it() {
-    let text = std::fs::read_to_string(own("bodies/f_average.obj")).unwrap();
-    let rows = |kind: &'static str| {
-        let lines = text.lines().filter_map(move |line| line.strip_prefix(kind));
-        lines.map(|line| {
-            line.split(' ')
-                .map(|n| n.parse::<f64>().unwrap())
-                .collect::<Vec<_>>()
-        })
-    };
-    let body = TriangleMesh {
-        positions: rows("v ").map(|v| Vec3::from_row_slice(&v)).collect(),
-        triangles: rows("f ")
-            .map(|f| [0, 1, 2].map(|k| f[k] as u32 - 1))
-            .collect(),
-    };
-    let pattern = read(&own("garments/tshirt.json")).unwrap();
+    let file = own("bodies/f_average.obj");
+    let body = io::body::read(&file, &BodyOptions::default()).unwrap().mesh;
+    let (_, pattern) = named_pattern(&own("garments/tshirt.json"));
     let mesh = mesh(&pattern, 0.03).unwrap();
     let garment = crate::garment::Garment {
         name: "tshirt".into(),
@@ -262,48 +127,23 @@ fn the_flat_t_shirt_surrounds_its_body_without_touching_it() {
         mesh,
         drape: None,
     };
-    let placed = garment.placed();
-    let nearest = |x: &Vec3| {
-        let distances = body.positions.iter().map(|p| (p - x).norm());
-        distances.fold(f64::INFINITY, f64::min)
-    };
-    let gap = placed.iter().map(nearest).fold(f64::INFINITY, f64::min);
-    // Body vertices are up to 2 cm apart, so that this is not far from the true distance.
+    let closest = ClosestPoint::new(&body);
+    let gaps = garment
+        .placed()
+        .into_iter()
+        .map(|x| closest.signed_distance(x));
+    // Positive outside. The draped cloth keeps 2 mm.
+    let gap = gaps.fold(f64::INFINITY, f64::min);
     assert!(gap > 0.008, "closest {gap} m");
-    let inside = placed
-        .iter()
-        .filter(|x| winding(**x, &body).abs() > 0.5)
-        .count();
-    assert_eq!(inside, 0);
-}
-
-/// How often a closed surface winds around `x` (van Oosterom & Strackee 1983).
-fn winding(x: Vec3, body: &TriangleMesh) -> f64 {
-    let solid_angle = |t: usize| {
-        let [a, b, c] = body.corners(t).map(|p| p - x);
-        let (l, m, n) = (a.norm(), b.norm(), c.norm());
-        let below = l * m * n + a.dot(&b) * n + b.dot(&c) * l + c.dot(&a) * m;
-        2.0 * a.dot(&b.cross(&c)).atan2(below)
-    };
-    (0..body.triangles.len()).map(solid_angle).sum::<f64>() / (4.0 * std::f64::consts::PI)
 }
 
 #[test]
 fn left_and_right_panels_of_shared_garments_mesh_as_mirror_images() {
     let (mut pairs, mut alike) = (0, 0);
-    for file in shared_garments()
-        .iter()
-        .filter(|file| file.parent().unwrap().ends_with("named"))
-    {
-        let pattern = read(file).unwrap();
-        let mesh = mesh(&pattern, 0.015).unwrap();
-        let inner = |p: usize| {
-            let outline: usize = mesh.edge_vertices[p]
-                .iter()
-                .map(|along| along.len() - 1)
-                .sum();
-            mesh.x_bar[mesh.panel_vertices[p].clone()][outline..].to_vec()
-        };
+    for file in shared(&["garments/named"], "json") {
+        let (_, pattern) = named_pattern(&file);
+        let mesh = mesh(&pattern, 0.025).unwrap();
+        let inner = |p: usize| inner_points(&mesh, p);
         for (left, panel) in pattern.panels.iter().enumerate() {
             let mut mirrored: Vec<Vec2> = panel
                 .vertices

@@ -7,8 +7,7 @@
 
 mod congruence;
 
-use crate::geometry::plane::{complex, point};
-use crate::geometry::{Vec2, Vec3};
+use crate::geometry::{Vec2, Vec3, bounds, complex, point};
 use crate::pattern::{Pattern, PatternMesh};
 use congruence::{Fit, SHAPE_TOLERANCE, Shape};
 use num_complex::Complex64;
@@ -171,11 +170,7 @@ impl Reflection {
 
 /// Diagonal of the box around all placed panels \[m\].
 fn diagonal(shapes: &[Shape]) -> f64 {
-    let start = (Vec3::repeat(f64::INFINITY), Vec3::repeat(f64::NEG_INFINITY));
-    let (low, high) = shapes
-        .iter()
-        .flat_map(Shape::placed)
-        .fold(start, |(low, high), p| (low.inf(&p), high.sup(&p)));
+    let (low, high) = bounds(shapes.iter().flat_map(Shape::placed));
     (high - low).norm()
 }
 
@@ -220,18 +215,9 @@ impl Seams {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cage::fixture::{panel, patterns, sampled};
-    use crate::pattern::{EdgeId, Panel, Stitch};
+    use crate::fixture::{SLEEVE, named_pattern, panel, panel_at, sampled, shared, stitch};
+    use crate::pattern::{Panel, Stitch};
     use approx::assert_relative_eq;
-
-    /// A lopsided sleeve, and its mirror image in the y axis, shifted.
-    const SLEEVE: [(f64, f64); 5] = [
-        (0.0, 0.0),
-        (0.2, 0.0),
-        (0.3, 0.42),
-        (0.1, 0.52),
-        (-0.05, 0.4),
-    ];
 
     fn mirrored(corners: &[(f64, f64)], shift: f64) -> Vec<(f64, f64)> {
         corners.iter().rev().map(|(x, y)| (shift - x, *y)).collect()
@@ -247,18 +233,10 @@ mod tests {
         symmetry.mirrors.iter().map(|m| m.panels).collect()
     }
 
-    fn stitch(a: (usize, usize), b: (usize, usize)) -> Stitch {
-        let id = |(panel, edge)| EdgeId { panel, edge };
-        Stitch {
-            sides: [id(a), id(b)],
-            right_wrong: false,
-        }
-    }
-
     #[test]
     fn left_and_right_sleeves_pair_up_with_their_reflection() {
-        let left = panel("left", &SLEEVE, Vec3::new(0.3, 1.2, 0.1));
-        let right = panel("right", &mirrored(&SLEEVE, 0.7), Vec3::new(-1.0, 1.2, 0.1));
+        let left = panel_at("left", &SLEEVE, Vec3::new(0.3, 1.2, 0.1));
+        let right = panel_at("right", &mirrored(&SLEEVE, 0.7), Vec3::new(-1.0, 1.2, 0.1));
         let symmetry = detect(vec![left, right], vec![]);
         assert_eq!(pairs(&symmetry), [[0, 1]]);
         assert_eq!(symmetry.plane, 0.0);
@@ -280,8 +258,8 @@ mod tests {
     #[test]
     fn equal_fronts_and_backs_mirror_themselves_and_not_each_other() {
         let skirt = [(-0.4, 0.0), (0.4, 0.0), (0.25, 0.6), (-0.25, 0.6)];
-        let front = panel("front", &skirt, Vec3::new(0.0, 0.5, 0.2));
-        let back = panel("back", &skirt, Vec3::new(0.0, 0.5, -0.2));
+        let front = panel_at("front", &skirt, Vec3::new(0.0, 0.5, 0.2));
+        let back = panel_at("back", &skirt, Vec3::new(0.0, 0.5, -0.2));
         let symmetry = detect(vec![front, back], vec![]);
         assert_eq!(pairs(&symmetry), [[0, 0], [1, 1]]);
         let axis = symmetry.mirrors[0].reflection;
@@ -295,7 +273,10 @@ mod tests {
     #[test]
     fn a_rectangle_mirrors_left_to_right_and_not_upside_down() {
         let band = [(-0.4, 0.0), (0.4, 0.0), (0.4, 0.05), (-0.4, 0.05)];
-        let symmetry = detect(vec![panel("band", &band, Vec3::new(0.3, 1.0, 0.1))], vec![]);
+        let symmetry = detect(
+            vec![panel_at("band", &band, Vec3::new(0.3, 1.0, 0.1))],
+            vec![],
+        );
         // Nothing else is placed, so the garment's own plane is where the band lies.
         assert_relative_eq!(symmetry.plane, 0.3, epsilon = 1e-6);
         let image = symmetry.mirrors[0].reflection.apply(Vec2::new(0.1, 0.01));
@@ -308,15 +289,11 @@ mod tests {
         let place = |side: f64| Vec3::new(0.5 * side, 0.0, 0.1);
         let (l, r) = (SLEEVE.to_vec(), mirrored(&SLEEVE, 0.0));
         let panels = vec![
-            panel("left", &l, place(1.0)),
-            panel("left_lining", &l, place(1.0)),
-            panel("right_lining", &r, place(-1.0)),
-            panel("right", &r, place(-1.0)),
-            panel(
-                "front",
-                &[(-0.3, 0.0), (0.3, 0.0), (0.3, 0.7), (-0.3, 0.7)],
-                Vec3::zeros(),
-            ),
+            panel_at("left", &l, place(1.0)),
+            panel_at("left_lining", &l, place(1.0)),
+            panel_at("right_lining", &r, place(-1.0)),
+            panel_at("right", &r, place(-1.0)),
+            panel("front", &[(-0.3, 0.0), (0.3, 0.0), (0.3, 0.7), (-0.3, 0.7)]),
         ];
         let stitches = vec![stitch((0, 0), (4, 0)), stitch((3, 0), (4, 2))];
         assert_eq!(pairs(&detect(panels, stitches)), [[0, 3], [1, 2], [4, 4]]);
@@ -324,15 +301,15 @@ mod tests {
 
     #[test]
     fn different_shapes_and_shifted_places_do_not_pair() {
-        let left = panel("left", &SLEEVE, Vec3::new(0.5, 1.2, 0.1));
+        let left = panel_at("left", &SLEEVE, Vec3::new(0.5, 1.2, 0.1));
         let mut longer = mirrored(&SLEEVE, 0.0);
         longer[4].1 -= 0.05;
-        let right = panel("right", &longer, Vec3::new(-0.5, 1.2, 0.1));
+        let right = panel_at("right", &longer, Vec3::new(-0.5, 1.2, 0.1));
         assert_eq!(
             pairs(&detect(vec![left.clone(), right], vec![])),
             [[0; 2]; 0]
         );
-        let behind = panel(
+        let behind = panel_at(
             "behind",
             &mirrored(&SLEEVE, 0.0),
             Vec3::new(-0.5, 1.2, -0.1),
@@ -343,10 +320,7 @@ mod tests {
     #[test]
     fn a_drape_tells_the_place_where_placements_do_not() {
         // Both panels wait at the origin, as from a texture atlas; the drape is off-centre and rough.
-        let panels = vec![
-            panel("a", &SLEEVE, Vec3::zeros()),
-            panel("b", &mirrored(&SLEEVE, 2.0), Vec3::zeros()),
-        ];
+        let panels = vec![panel("a", &SLEEVE), panel("b", &mirrored(&SLEEVE, 2.0))];
         let pattern = Pattern {
             panels,
             stitches: vec![],
@@ -379,8 +353,8 @@ mod tests {
 
     #[test]
     fn mirrored_meshes_give_matching_vertices_and_others_do_not() {
-        let left = panel("left", &SLEEVE, Vec3::new(0.5, 0.0, 0.0));
-        let right = panel("right", &mirrored(&SLEEVE, 0.0), Vec3::new(-0.5, 0.0, 0.0));
+        let left = panel_at("left", &SLEEVE, Vec3::new(0.5, 0.0, 0.0));
+        let right = panel_at("right", &mirrored(&SLEEVE, 0.0), Vec3::new(-0.5, 0.0, 0.0));
         let pattern = Pattern {
             panels: vec![left, right],
             stitches: vec![],
@@ -407,7 +381,8 @@ mod tests {
 
     #[test]
     fn garmentcode_names_and_shapes_agree_on_the_pairs() {
-        for (name, pattern) in patterns() {
+        for path in shared(&["garments/named", "garments/random"], "json") {
+            let (name, pattern) = named_pattern(&path);
             let symmetry = Symmetry::detect(&pattern, &sampled(&pattern, 0.05), None);
             for mirror in &symmetry.mirrors {
                 let [a, b] = mirror.panels.map(|p| pattern.panels[p].name.as_str());

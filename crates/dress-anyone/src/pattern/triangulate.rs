@@ -7,9 +7,10 @@
 
 use super::canonical::Canonical;
 use super::interior::{Filling, fill};
-use super::sew::{Groups, centimetres, place, sew, sewing_problems};
+use super::sew::{centimetres, place, sew, sewing_problems};
 use super::{EdgeId, Panel, Pattern, PatternMesh};
-use crate::geometry::polygon::first_crossing;
+use crate::geometry::groups::Groups;
+use crate::geometry::polygon::Polygon;
 use crate::geometry::quality::quality;
 use crate::geometry::{Vec2, Vec3, signed_area};
 use crate::problem::Problem;
@@ -174,7 +175,7 @@ fn mesh_panel(panel: &Panel, pieces: &[usize], resolution: f64) -> Result<PanelM
             "its outline encloses nothing; draw at least three edges".into(),
         ));
     }
-    if let Some((i, j)) = first_crossing(&outline) {
+    if let Some((i, j)) = Polygon::new(outline.clone()).first_meeting() {
         return Err(here(format!(
             "its outline meets itself: edge {} and edge {} near {}; redraw it, or mesh more finely if the curves only pass close by",
             edge_of[i],
@@ -259,4 +260,4 @@ fn assemble(pattern: &Pattern, panels: Vec<PanelMesh>) -> PatternMesh {
 
 #[cfg(test)]
 #[allow(clippy::unwrap_used)]
-mod tests;
+pub(super) mod tests;

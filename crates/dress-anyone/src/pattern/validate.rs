@@ -6,6 +6,7 @@
 //! (dart legs, slits), not for a mistake.
 
 use super::{EdgeId, Panel, Pattern};
+use crate::geometry::polygon::{Crossing, Polygon, perimeter};
 use crate::geometry::{Vec2, signed_area};
 use crate::problem::Problem;
 use std::collections::{BTreeMap, BTreeSet};
@@ -167,13 +168,6 @@ struct Outline {
     edges: Vec<usize>,
 }
 
-/// Two sides of the polygon, in order, and the point where they cross.
-#[derive(Clone, Copy)]
-struct Crossing {
-    sides: (usize, usize),
-    point: Vec2,
-}
-
 impl Outline {
     fn new(panel: &Panel) -> Self {
         let (mut points, mut edges) = (Vec::new(), Vec::new());
@@ -190,10 +184,6 @@ impl Outline {
             }
         }
         Self { points, edges }
-    }
-
-    fn side(&self, i: usize) -> (Vec2, Vec2) {
-        (self.points[i], self.points[(i + 1) % self.points.len()])
     }
 
     fn area_problem(&self, panel: &Panel) -> Option<Problem> {
@@ -230,30 +220,10 @@ impl Outline {
         found.map(|(crossing, _)| pair(crossing)).collect()
     }
 
-    /// All proper crossings of sides that are not neighbours, in loop order.
+    /// Crossings of the loop with itself, in loop order.
     fn crossings(&self) -> Vec<Crossing> {
-        let n = self.points.len();
-        let low = |i: usize| self.side(i).0.x.min(self.side(i).1.x);
-        let high = |i: usize| self.side(i).0.x.max(self.side(i).1.x);
-        let mut order: Vec<usize> = (0..n).collect();
-        order.sort_by(|&i, &j| low(i).total_cmp(&low(j)));
-        let mut open: Vec<usize> = Vec::new();
-        let mut found = Vec::new();
-        for i in order {
-            open.retain(|&j| high(j) >= low(i));
-            for &j in &open {
-                let sides = (i.min(j), i.max(j));
-                let apart = sides.1 - sides.0;
-                if apart > 1 && apart < n - 1 {
-                    let point = crossing_point(self.side(sides.0), self.side(sides.1));
-                    found.extend(point.map(|point| Crossing { sides, point }));
-                }
-            }
-            open.push(i);
-            if found.len() > MANY {
-                break;
-            }
-        }
+        let polygon = Polygon::new(self.points.clone());
+        let mut found: Vec<_> = polygon.crossings().take(MANY).collect();
         found.sort_by_key(|crossing| crossing.sides);
         found
     }
@@ -287,52 +257,11 @@ fn is_sliver(polygon: &[Vec2]) -> bool {
     signed_area(polygon).abs() <= TOUCH * 0.5 * perimeter(polygon)
 }
 
-fn perimeter(polygon: &[Vec2]) -> f64 {
-    let next = polygon.iter().cycle().skip(1);
-    polygon.iter().zip(next).map(|(a, b)| (b - a).norm()).sum()
-}
-
-/// Where two segments cross, each passing from one side of the other to the other side.
-fn crossing_point((a, b): (Vec2, Vec2), (c, d): (Vec2, Vec2)) -> Option<Vec2> {
-    let turn = |p: Vec2, q: Vec2, r: Vec2| {
-        let coord = |v: Vec2| robust::Coord { x: v.x, y: v.y };
-        robust::orient2d(coord(p), coord(q), coord(r))
-    };
-    let opposite = |s: f64, t: f64| (s > 0.0 && t < 0.0) || (s < 0.0 && t > 0.0);
-    let (to_c, to_d) = (turn(a, b, c), turn(a, b, d));
-    if opposite(to_c, to_d) && opposite(turn(c, d, a), turn(c, d, b)) {
-        Some(c + (d - c) * (to_c / (to_c - to_d)))
-    } else {
-        None
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::{Mat3, Vec3};
-    use crate::pattern::{Curve, Edge, Placement, Stitch};
-
-    /// A panel with straight edges between `corners` \[m\].
-    fn polygon(corners: &[[f64; 2]]) -> Panel {
-        let n = corners.len();
-        let edge = |i| Edge {
-            start: i,
-            end: (i + 1) % n,
-            curve: Curve::Line,
-            label: None,
-        };
-        Panel {
-            name: "p".to_owned(),
-            vertices: corners.iter().map(|c| Vec2::from(*c)).collect(),
-            edges: (0..n).map(edge).collect(),
-            placement: Placement {
-                rotation: Mat3::identity(),
-                translation: Vec3::zeros(),
-            },
-            label: None,
-        }
-    }
+    use crate::fixture::{panel, stitch};
+    use crate::pattern::Curve;
 
     fn told(panel: &Panel) -> String {
         let told: Vec<_> = panel_problems(panel)
@@ -348,14 +277,14 @@ mod tests {
     fn a_square_with_a_dart_is_sound_either_way_round() {
         let mut dart = vec![[0.1, 0.0], [0.15, 0.1], [0.2, 0.0]];
         dart.extend([[0.3, 0.0], [0.3, 0.3], [0.0, 0.3], [0.0, 0.0]]);
-        assert_eq!(told(&polygon(&dart)), "");
+        assert_eq!(told(&panel("p", &dart)), "");
         dart.reverse();
-        assert_eq!(told(&polygon(&dart)), "");
+        assert_eq!(told(&panel("p", &dart)), "");
     }
 
     #[test]
     fn a_crossing_is_told_by_its_two_edges() {
-        let mut panel = polygon(&SQUARE);
+        let mut panel = panel("p", &SQUARE);
         // Both curves reach 10 cm past the middle.
         panel.edges[0].curve = Curve::Quadratic(Vec2::new(0.15, 0.5));
         panel.edges[2].curve = Curve::Quadratic(Vec2::new(0.15, -0.2));
@@ -366,7 +295,7 @@ mod tests {
 
     #[test]
     fn a_loop_within_one_edge_is_told() {
-        let mut panel = polygon(&SQUARE);
+        let mut panel = panel("p", &SQUARE);
         panel.edges[0].curve = Curve::Cubic([Vec2::new(0.9, -0.4), Vec2::new(-0.6, -0.4)]);
         assert_eq!(
             told(&panel),
@@ -377,7 +306,7 @@ mod tests {
     #[test]
     fn edges_that_overlap_by_less_than_a_pen_stroke_only_touch() {
         let overlapping_by = |depth: f64| {
-            let mut panel = polygon(&SQUARE);
+            let mut panel = panel("p", &SQUARE);
             // A parabola with its control point at height 2 h rises to h.
             panel.edges[0].curve = Curve::Quadratic(Vec2::new(0.15, 0.3 + depth));
             panel.edges[2].curve = Curve::Quadratic(Vec2::new(0.15, -depth));
@@ -392,35 +321,30 @@ mod tests {
     fn a_slit_of_no_width_is_allowed_and_a_panel_of_no_width_is_not() {
         let mut slit = vec![[0.15, 0.0], [0.15, 0.1], [0.15 + 1e-5, 0.0]];
         slit.extend([[0.3, 0.0], [0.3, 0.3], [0.0, 0.3], [0.0, 0.0]]);
-        assert_eq!(told(&polygon(&slit)), "");
-        let strip = polygon(&[[0.0, 0.0], [0.3, 0.0], [0.3, 1e-5], [0.0, 1e-5]]);
+        assert_eq!(told(&panel("p", &slit)), "");
+        let strip = panel("p", &[[0.0, 0.0], [0.3, 0.0], [0.3, 1e-5], [0.0, 1e-5]]);
         assert!(told(&strip).contains("encloses no area"));
     }
 
     #[test]
     fn a_corner_passed_twice_and_a_position_that_is_no_number_are_told() {
-        let mut eight = polygon(&[[0.0, 0.0], [0.1, 0.1], [0.2, 0.0], [0.2, 0.2]]);
+        let mut eight = panel("p", &[[0.0, 0.0], [0.1, 0.1], [0.2, 0.0], [0.2, 0.2]]);
         eight.edges[2].end = 1;
         eight.edges[3].start = 1;
         assert!(told(&eight).contains("passes corner 1 a second time"));
-        let mut nowhere = polygon(&SQUARE);
+        let mut nowhere = panel("p", &SQUARE);
         nowhere.vertices[2].x = f64::NAN;
         assert!(told(&nowhere).contains("edge 1: starts and ends at the same point"));
     }
 
     #[test]
     fn a_stitch_that_names_nothing_or_something_sewn_is_told() {
-        let side = |panel, edge| EdgeId { panel, edge };
-        let stitch = |sides| Stitch {
-            sides,
-            right_wrong: false,
-        };
         let pattern = Pattern {
-            panels: vec![polygon(&SQUARE)],
+            panels: vec![panel("p", &SQUARE)],
             stitches: vec![
-                stitch([side(0, 0), side(0, 1)]),
-                stitch([side(0, 1), side(0, 4)]),
-                stitch([side(1, 0), side(0, 2)]),
+                stitch((0, 0), (0, 1)),
+                stitch((0, 1), (0, 4)),
+                stitch((1, 0), (0, 2)),
             ],
         };
         let told: Vec<_> = problems(&pattern).iter().map(|p| p.place.clone()).collect();

@@ -2,6 +2,7 @@
 //! and what is odd about it told.
 
 use crate::geometry::TriangleMesh;
+use crate::geometry::groups::Groups;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Fans of triangles from the first corner of each polygon. Only the topology decides, so that
@@ -193,14 +194,14 @@ fn component_sizes(mesh: &TriangleMesh) -> Vec<usize> {
 /// Sizes of the groups that `links` make of `count` vertices, largest first; vertices without a
 /// link are no group.
 fn group_sizes(links: &[[u32; 2]], count: usize) -> Vec<usize> {
-    let mut groups = super::super::source::Groups::new(count);
-    for &[a, b] in links {
-        groups.join(a as usize, b as usize);
+    let mut groups = Groups::new(count);
+    for &link in links {
+        groups.join(link);
     }
     let linked: BTreeSet<u32> = links.iter().flatten().copied().collect();
-    let mut sizes: BTreeMap<usize, usize> = BTreeMap::new();
+    let mut sizes: BTreeMap<u32, usize> = BTreeMap::new();
     for v in linked {
-        *sizes.entry(groups.of(v as usize)).or_default() += 1;
+        *sizes.entry(groups.first_of(v)).or_default() += 1;
     }
     let mut sizes: Vec<usize> = sizes.into_values().collect();
     sizes.sort_unstable_by(|a, b| b.cmp(a));

@@ -4,8 +4,9 @@
 //! Pairs rather than bare `vt`: two panels that a texture lays on top of one another stay two.
 
 use crate::geometry::cross2;
+use crate::geometry::groups::Groups;
 use crate::io::obj::{Document, Face};
-use crate::io::source::{Groups, Problems};
+use crate::io::source::Problems;
 use crate::problem::Problem;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
@@ -120,8 +121,8 @@ impl Cutting {
         let pairs: Vec<Pair> = self.pairs.keys().copied().collect();
         let mut groups = Groups::new(pairs.len());
         for ([a, b, c], _) in &self.triangles {
-            groups.join(*a, *b);
-            groups.join(*b, *c);
+            groups.join([*a, *b].map(|pair| pair as u32));
+            groups.join([*b, *c].map(|pair| pair as u32));
         }
         // Panels in the order of their first faces.
         let mut panel_of = BTreeMap::new();
@@ -129,7 +130,7 @@ impl Cutting {
         let mut panel_faces: Vec<Vec<([usize; 3], usize)>> = Vec::new();
         for triangle in &self.triangles {
             let panel = *panel_of
-                .entry(groups.of(triangle.0[0]))
+                .entry(groups.first_of(triangle.0[0] as u32))
                 .or_insert(members.len());
             if panel == members.len() {
                 members.push(Vec::new());
@@ -138,7 +139,7 @@ impl Cutting {
             panel_faces[panel].push(*triangle);
         }
         for pair in 0..pairs.len() {
-            if let Some(panel) = panel_of.get(&groups.of(pair)) {
+            if let Some(panel) = panel_of.get(&groups.first_of(pair as u32)) {
                 members[*panel].push(pair);
             }
         }

@@ -6,8 +6,7 @@
 use super::UvOptions;
 use super::islands::Islands;
 use crate::body::{FileFrame, UpAxis};
-use crate::geometry::mesh::bounds;
-use crate::geometry::{Mat2, Vec2, Vec3};
+use crate::geometry::{Mat2, Vec2, Vec3, bounds};
 use crate::io::obj::Document;
 use crate::problem::Problem;
 use std::ops::Range;

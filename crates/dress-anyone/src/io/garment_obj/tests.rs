@@ -1,4 +1,5 @@
 use super::*;
+use crate::fixture::shared;
 use crate::pattern::{Curve, Edge, EdgeId, Panel, Stitch};
 use proptest::prelude::*;
 
@@ -413,21 +414,15 @@ proptest! {
     }
 }
 
-/// A real file next to the repository, or where `DRESS_SHARED` points; none elsewhere.
-fn shared(name: &str) -> Option<std::path::PathBuf> {
-    let beside = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared");
-    let folder = std::env::var("DRESS_SHARED").unwrap_or_else(|_| beside.into());
-    let path = Path::new(&folder).join("data/garments/obj").join(name);
-    if path.exists() {
-        return Some(path);
-    }
-    println!("skipped: no shared data");
-    None
+/// A drape of the shared data, where they are at hand.
+fn shared_drape(name: &str) -> Option<std::path::PathBuf> {
+    let mut files = shared(&["garments/obj"], "obj").into_iter();
+    files.find(|path| path.ends_with(name))
 }
 
 #[test]
 fn the_shared_t_shirt_has_four_panels_and_opens_at_neck_hem_and_sleeves() {
-    let Some(path) = shared("diffavatar_tshirt.obj") else {
+    let Some(path) = shared_drape("diffavatar_tshirt.obj") else {
         return;
     };
     let read = super::read(&path, &UvOptions::default()).unwrap();
@@ -474,7 +469,7 @@ fn the_shared_t_shirt_has_four_panels_and_opens_at_neck_hem_and_sleeves() {
 
 #[test]
 fn the_shared_dress_is_refused_for_its_warped_texture() {
-    let Some(path) = shared("diffavatar_dress_shortsleeve.obj") else {
+    let Some(path) = shared_drape("diffavatar_dress_shortsleeve.obj") else {
         return;
     };
     let error = super::read(&path, &UvOptions::default())

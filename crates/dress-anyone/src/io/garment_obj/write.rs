@@ -4,7 +4,7 @@
 use super::tags::{CurveTag, EdgeTag, MARK, PanelTag, StitchTag};
 use crate::body::FileFrame;
 use crate::garment::Garment;
-use crate::geometry::{Vec2, Vec3};
+use crate::geometry::{Vec2, Vec3, bounds};
 use crate::io::obj::ObjText;
 use crate::pattern::{Curve, EdgeId};
 use std::ops::Range;
@@ -50,10 +50,7 @@ pub fn write(garment: &Garment, x_bar: &[Vec2], x: &[Vec3], frame: FileFrame) ->
 fn layout(panels: &[Range<usize>], x_bar: &[Vec2]) -> Vec<Vec2> {
     let mut at = 0.0;
     let offset = |range: &Range<usize>| {
-        let start = (Vec2::repeat(f64::INFINITY), Vec2::repeat(f64::NEG_INFINITY));
-        let (low, high) = x_bar[range.clone()]
-            .iter()
-            .fold(start, |(low, high), p| (low.inf(p), high.sup(p)));
+        let (low, high) = bounds(&x_bar[range.clone()]);
         let offset = Vec2::new(at - low.x, -low.y);
         at += high.x - low.x + GAP;
         offset

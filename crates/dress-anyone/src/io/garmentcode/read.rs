@@ -52,7 +52,7 @@ fn other_kind(file: &Path, bytes: &[u8]) -> Option<BadInput> {
     let text = format!(
         "this looks like {}; a garment is a GarmentCode pattern (*_specification.json). \
          Were garment and body swapped?",
-        kind::of(bytes).filter(|kind| *kind != "a JSON document")?
+        kind::of(bytes).filter(|kind| *kind != kind::JSON)?
     );
     Some(BadInput::one(file, Problem::whole(text)))
 }

@@ -4,11 +4,11 @@
 mod generated;
 
 use super::*;
+use crate::fixture::{GARMENTS, shared};
 use crate::geometry::{Vec2, Vec3};
 use crate::pattern::Curve;
 use approx::assert_relative_eq;
 use serde_json::json;
-use std::path::PathBuf;
 
 /// Positions that were scaled to file units and back agree to this \[m\].
 const SAME: f64 = 1e-9;
@@ -334,26 +334,9 @@ fn writing_back_keeps_what_is_not_understood() {
     assert_same(&pattern, &parsed(&written).unwrap().pattern);
 }
 
-/// The garments shared between repositories, where they are at hand.
-fn shared_garments() -> Vec<PathBuf> {
-    let beside = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared");
-    let shared = std::env::var_os("DRESS_SHARED").map_or(beside, PathBuf::from);
-    let mut files = Vec::new();
-    for folder in ["named", "random", "shipped", "templates2021"] {
-        let entries = std::fs::read_dir(shared.join("data/garments").join(folder));
-        files.extend(entries.into_iter().flatten().map(|e| e.unwrap().path()));
-    }
-    files.retain(|path| path.extension().is_some_and(|e| e == "json"));
-    files.sort();
-    if files.is_empty() {
-        println!("skipped: no shared garments here");
-    }
-    files
-}
-
 #[test]
 fn every_shared_garment_is_accepted_and_survives_writing() {
-    for path in shared_garments() {
+    for path in shared(&GARMENTS, "json") {
         let read = read(&path, &ReadOptions::default()).unwrap_or_else(|e| panic!("{e}"));
         let back = write(&read.pattern, Some(&read));
         assert_same(&read.pattern, &parsed(&back).unwrap().pattern);

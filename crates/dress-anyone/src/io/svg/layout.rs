@@ -1,6 +1,7 @@
 //! Where panels go on a sheet, and where a panel has room for its name.
 
-use crate::geometry::Vec2;
+use crate::geometry::polygon::{Polygon, sides};
+use crate::geometry::{Vec2, bounds};
 
 /// Puts boxes of these sizes onto a sheet in rows, `gap` apart: the tallest first, rows filled from
 /// the left, the rows of the length that makes the sheet's longer side shortest. Gives each box's
@@ -38,11 +39,10 @@ fn rows(sizes: &[Vec2], order: &[usize], gap: f64, room: f64) -> (Vec<Vec2>, Vec
 
 /// Smallest and largest corner of the box around `points`; zero without any.
 pub(super) fn box_around(points: &[Vec2]) -> (Vec2, Vec2) {
-    points
-        .iter()
-        .map(|p| (*p, *p))
-        .reduce(|a, b| (a.0.inf(&b.0), a.1.sup(&b.1)))
-        .unwrap_or_default()
+    if points.is_empty() {
+        return Default::default();
+    }
+    bounds(points)
 }
 
 /// The point of a polygon farthest from its outline, to about a fortieth of its box, and that
@@ -50,12 +50,13 @@ pub(super) fn box_around(points: &[Vec2]) -> (Vec2, Vec2) {
 pub(super) fn heart(polygon: &[Vec2]) -> (Vec2, f64) {
     const CELLS: usize = 40;
     let (low, high) = box_around(polygon);
+    let polygon = Polygon::new(polygon.to_vec());
     let mut best = ((low + high) * 0.5, 0.0);
     for i in 0..CELLS * CELLS {
         let cell = Vec2::new((i % CELLS) as f64 + 0.5, (i / CELLS) as f64 + 0.5);
         let p = low + cell.component_mul(&(high - low)) / CELLS as f64;
-        if contains(polygon, p) {
-            let distance = distance_to_outline(polygon, p);
+        if polygon.contains(p) {
+            let distance = polygon.distance(p);
             // Of many as good, the leftmost: rounding does not choose.
             if distance > 1.001 * best.1 {
                 best = (p, distance);
@@ -71,31 +72,12 @@ pub(super) fn room_to_the_right(polygon: &[Vec2], p: Vec2) -> f64 {
     if first.is_finite() { first - p.x } else { 0.0 }
 }
 
-/// Whether a ray from `p` to the right crosses the outline an odd number of times.
-fn contains(polygon: &[Vec2], p: Vec2) -> bool {
-    crossings(polygon, p).count() % 2 == 1
-}
-
 /// Where the ray from `p` to the right crosses the outline: x.
 fn crossings(polygon: &[Vec2], p: Vec2) -> impl Iterator<Item = f64> {
     sides(polygon)
         .filter(move |(a, b)| (a.y > p.y) != (b.y > p.y))
         .map(move |(a, b)| a.x + (p.y - a.y) / (b.y - a.y) * (b.x - a.x))
         .filter(move |x| *x > p.x)
-}
-
-fn distance_to_outline(polygon: &[Vec2], p: Vec2) -> f64 {
-    let distances = sides(polygon).map(|(a, b)| {
-        let along = b - a;
-        let t = (p - a).dot(&along) / along.norm_squared().max(f64::MIN_POSITIVE);
-        (p - a - along * t.clamp(0.0, 1.0)).norm()
-    });
-    distances.fold(f64::INFINITY, f64::min)
-}
-
-fn sides(polygon: &[Vec2]) -> impl Iterator<Item = (Vec2, Vec2)> {
-    let next = polygon.iter().cycle().skip(1);
-    polygon.iter().copied().zip(next.copied())
 }
 
 #[cfg(test)]

@@ -125,7 +125,7 @@ fn side(pattern: &Pattern, chain: &[Stitch], s: usize) -> Side {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::io::svg::tests::{panel, stitch};
+    use crate::fixture::{panel, stitch};
 
     /// Two squares whose right and left sides are cut in two.
     fn cut_squares() -> Pattern {

@@ -1,40 +1,5 @@
 use super::*;
-use crate::geometry::{Mat3, Vec3};
-use crate::pattern::{Edge, EdgeId, Placement, Stitch};
-
-pub(super) fn panel(name: &str, corners: &[[f64; 2]]) -> Panel {
-    let count = corners.len();
-    let edge = |start: usize| Edge {
-        start,
-        end: (start + 1) % count,
-        curve: Curve::Line,
-        label: None,
-    };
-    Panel {
-        name: name.to_owned(),
-        vertices: corners.iter().map(|c| Vec2::from(*c)).collect(),
-        edges: (0..count).map(edge).collect(),
-        placement: Placement {
-            rotation: Mat3::identity(),
-            translation: Vec3::zeros(),
-        },
-        label: None,
-    }
-}
-
-pub(super) fn stitch(a: (usize, usize), b: (usize, usize)) -> Stitch {
-    Stitch {
-        sides: [a, b].map(|(panel, edge)| EdgeId { panel, edge }),
-        right_wrong: false,
-    }
-}
-
-fn rectangle(name: &str, width: f64, height: f64) -> Panel {
-    panel(
-        name,
-        &[[0.0, 0.0], [width, 0.0], [width, height], [0.0, height]],
-    )
-}
+use crate::fixture::{rectangle, stitch};
 
 fn alone(panel: Panel) -> Pattern {
     Pattern {

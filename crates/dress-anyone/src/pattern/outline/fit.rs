@@ -5,6 +5,7 @@
 //! the curve, which only slides the parameters, is damped (Wang, Pottmann, Liu 2006, tangent distance
 //! minimisation). Arcs: the same for their one unknown, the bulge tan(sweep/4).
 
+use crate::geometry::polygon::distance_to_segment;
 use crate::geometry::{Mat2, Vec2, cross2};
 use crate::pattern::Curve;
 use nalgebra::{DMatrix, DVector};
@@ -58,24 +59,11 @@ pub(super) fn residual(curve: &Curve, points: &[Vec2], bulges: &[f64]) -> f64 {
     for k in 0..bulges.len() {
         for share in [0.25, 0.5, 0.75] {
             let between = curve.point(a, b, t[k] + share * (t[k + 1] - t[k]));
-            let off = distance_to_segment(between, points[k], points[k + 1]);
+            let off = distance_to_segment(between, (points[k], points[k + 1]));
             largest = largest.max(off - bulges[k]);
         }
     }
     largest
-}
-
-/// Distance of `p` from the segment from `a` to `b` \[m\].
-pub(super) fn distance_to_segment(p: Vec2, a: Vec2, b: Vec2) -> f64 {
-    let along = b - a;
-    let t = (p - a).dot(&along) / along.norm_squared();
-    // Not a number when the segment is a point.
-    let t = if t.is_finite() {
-        t.clamp(0.0, 1.0)
-    } else {
-        0.0
-    };
-    (a + along * t - p).norm()
 }
 
 fn refined_bezier(start: &Curve, points: &[Vec2]) -> Curve {

@@ -2,9 +2,8 @@
 //! garments where they are at hand.
 
 use super::*;
-use crate::geometry::{Mat2, Mat3, Vec3};
-use crate::io::garmentcode;
-use crate::pattern::{Edge, Panel, Placement};
+use crate::fixture::{named_pattern, panel, shared};
+use crate::geometry::Mat2;
 use approx::assert_relative_eq;
 use proptest::prelude::*;
 
@@ -25,22 +24,10 @@ fn four_kinds() -> Pattern {
 }
 
 fn four_sided(corners: [Vec2; 4], curves: [Curve; 4]) -> Pattern {
-    let edges = curves.into_iter().enumerate().map(|(e, curve)| Edge {
-        start: e,
-        end: (e + 1) % 4,
-        curve,
-        label: None,
-    });
-    let panel = Panel {
-        name: "p".to_owned(),
-        vertices: corners.to_vec(),
-        edges: edges.collect(),
-        placement: Placement {
-            rotation: Mat3::identity(),
-            translation: Vec3::zeros(),
-        },
-        label: None,
-    };
+    let mut panel = panel("p", &corners.map(<[f64; 2]>::from));
+    for (edge, curve) in panel.edges.iter_mut().zip(curves) {
+        edge.curve = curve;
+    }
     Pattern {
         panels: vec![panel],
         stitches: Vec::new(),
@@ -354,28 +341,29 @@ proptest! {
             let t = f64::from(i) / 10.0;
             let here = curve.point(points[0], points[n], t);
             let there = other.point(mirrored[0], mirrored[n], 1.0 - t);
-            prop_assert!((mirror(here) - there).norm() < 1e-9);
+            // A few points hardly hold a cubic: along what they leave free (the least damping is
+            // 1e-7) round-off grows, though the residual does not.
+            let apart = (mirror(here) - there).norm();
+            prop_assert!(apart < 1e-6, "{apart:e}");
         }
     }
 }
 
 #[test]
 fn edges_of_real_garments_are_redrawn_within_a_pencil_line() {
-    let beside = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared");
-    let shared = std::env::var_os("DRESS_SHARED").map_or(beside, std::path::PathBuf::from);
-    let Ok(folder) = std::fs::read_dir(shared.join("data/garments/named")) else {
-        println!("skipped: no shared garments here");
+    let files = shared(&["garments/named"], "json");
+    if files.is_empty() {
         return;
-    };
+    }
     // Wider by an eighth, longer by a tenth, and bent by up to 2 cm over half a metre.
     let deform = |p: Vec2| {
         let bend = Vec2::new((6.0 * p.y).sin(), (5.0 * p.x + 2.0 * p.y).cos());
         Vec2::new(1.125 * p.x, 1.1 * p.y) + 0.02 * bend
     };
     let (mut count, mut close, mut worst) = (0, 0, (0.0, String::new()));
-    for path in folder.map(|entry| entry.unwrap().path()) {
-        let read = garmentcode::read(&path, &garmentcode::ReadOptions::default()).unwrap();
-        for panel in &read.pattern.panels {
+    for path in files {
+        let (name, pattern) = named_pattern(&path);
+        for panel in &pattern.panels {
             for (e, edge) in panel.edges.iter().enumerate() {
                 let (a, b) = panel.ends(e);
                 // Mesh edges of 12 mm.
@@ -386,10 +374,7 @@ fn edges_of_real_garments_are_redrawn_within_a_pencil_line() {
                 count += 1;
                 close += usize::from(residual <= TOLERANCE);
                 if residual > worst.0 {
-                    worst = (
-                        residual,
-                        format!("{}, {}, edge {e}", path.display(), panel.name),
-                    );
+                    worst = (residual, format!("{name}, {}, edge {e}", panel.name));
                 }
             }
         }

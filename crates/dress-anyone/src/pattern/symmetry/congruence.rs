@@ -5,8 +5,8 @@
 //! shift has `u = c/|c|` (complex Procrustes).
 
 use super::Reflection;
-use crate::geometry::plane::{complex, point, sides};
-use crate::geometry::{Mat2, Vec2, Vec3, signed_area};
+use crate::geometry::polygon::sides;
+use crate::geometry::{Mat2, Vec2, Vec3, complex, point, signed_area};
 use crate::pattern::{Pattern, PatternMesh};
 use nalgebra::Matrix3x2;
 use num_complex::Complex64;

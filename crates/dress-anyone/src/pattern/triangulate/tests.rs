@@ -1,47 +1,20 @@
 //! What a mesh must be, on patterns small enough to know.
 
 use super::*;
-use crate::geometry::Mat3;
+use crate::check::noise;
+use crate::fixture::{panel, rectangle, stitch};
 use crate::geometry::quality::{QualitySummary, qualities};
-use crate::pattern::{Curve, Edge, Placement, Stitch};
-
-/// A panel of straight edges through `corners` \[m\].
-fn panel(name: &str, corners: &[(f64, f64)]) -> Panel {
-    let count = corners.len();
-    let edge = |start| Edge {
-        start,
-        end: (start + 1) % count,
-        curve: Curve::Line,
-        label: None,
-    };
-    Panel {
-        name: name.into(),
-        vertices: corners.iter().map(|&(x, y)| Vec2::new(x, y)).collect(),
-        edges: (0..count).map(edge).collect(),
-        placement: Placement {
-            rotation: Mat3::identity(),
-            translation: Vec3::zeros(),
-        },
-        label: None,
-    }
-}
-
-fn rectangle(name: &str, width: f64, height: f64) -> Panel {
-    panel(
-        name,
-        &[(0.0, 0.0), (width, 0.0), (width, height), (0.0, height)],
-    )
-}
-
-fn stitch(a: (usize, usize), b: (usize, usize)) -> Stitch {
-    Stitch {
-        sides: [a, b].map(|(panel, edge)| EdgeId { panel, edge }),
-        right_wrong: false,
-    }
-}
+use crate::pattern::{Curve, Stitch};
 
 fn pattern(panels: Vec<Panel>, stitches: Vec<Stitch>) -> Pattern {
     Pattern { panels, stitches }
+}
+
+/// The points of panel `p` inside its outline \[m\].
+pub(crate) fn inner_points(mesh: &PatternMesh, p: usize) -> Vec<Vec2> {
+    let along = mesh.edge_vertices[p].iter();
+    let outline: usize = along.map(|vertices| vertices.len() - 1).sum();
+    mesh.x_bar[mesh.panel_vertices[p].clone()][outline..].to_vec()
 }
 
 fn area(mesh: &PatternMesh) -> f64 {
@@ -208,13 +181,7 @@ fn mirrored_and_turned_copies_of_a_panel_get_mirrored_and_turned_meshes() {
     ];
     let mesh = mesh(&pattern(panels, vec![]), 0.01).unwrap();
     assert_eq!(mesh.right_side_up, [true, true, false]);
-    let inner = |p: usize| {
-        let outline: usize = mesh.edge_vertices[p]
-            .iter()
-            .map(|along| along.len() - 1)
-            .sum();
-        mesh.x_bar[mesh.panel_vertices[p].clone()][outline..].to_vec()
-    };
+    let inner = |p: usize| inner_points(&mesh, p);
     assert_eq!(inner(0).len(), inner(1).len());
     for ((a, b), c) in inner(0).into_iter().zip(inner(1)).zip(inner(2)) {
         let (x, y) = turn((a.x, a.y));
@@ -257,4 +224,77 @@ fn outlines_that_cross_and_absurd_resolutions_are_refused() {
     for resolution in [0.0, -1.0, f64::NAN, 1e-6] {
         assert!(mesh(&plain, resolution).is_err());
     }
+}
+
+#[test]
+fn a_panel_too_narrow_for_any_triangle_is_named() {
+    // A wedge 10 µm high: triangles of 20 mm on it have q of about 10 µm / 20 mm, below 1e-3.
+    let wedge = panel("tie", &[(0.0, 0.0), (0.2, 0.0), (0.1, 1e-5)]);
+    let problems = mesh(&pattern(vec![wedge], vec![]), 0.02).unwrap_err();
+    assert_eq!(problems[0].place, "panel `tie`");
+    assert!(problems[0].text.contains("too narrow"), "{problems:?}");
+}
+
+#[test]
+fn points_of_a_panel_that_another_panel_sews_together_are_named() {
+    // Hem and shoulder of the front are both sewn to the back's hem.
+    let panels = vec![rectangle("front", 0.2, 0.3), rectangle("back", 0.2, 0.3)];
+    let doubled = pattern(panels, vec![stitch((0, 0), (1, 0)), stitch((0, 2), (1, 0))]);
+    let problems = mesh(&doubled, 0.02).unwrap_err();
+    assert_eq!(problems[0].place, "panel `front`");
+    // The hem's start meets the shoulder's: the corners (0, 0) and (20, 30) cm.
+    for told in ["(0.0, 0.0) cm", "(20.0, 30.0) cm", "by way of other panels"] {
+        assert!(problems[0].text.contains(told), "{problems:?}");
+    }
+}
+
+#[test]
+fn a_triangle_that_sewing_closes_onto_itself_is_named() {
+    // A cone of a single triangle: sewing its two sides joins the ends of its base.
+    let cone = panel("cone", &[(0.0, 0.0), (0.2, 0.0), (0.1, 0.04)]);
+    let cone = pattern(vec![cone], vec![stitch((0, 1), (0, 2))]);
+    let problems = mesh(&cone, 0.3).unwrap_err();
+    assert_eq!(problems[0].place, "panel `cone`");
+    let told = "closes a triangle";
+    assert!(problems[0].text.contains(told), "{problems:?}");
+    // More finely, its blunt tip has a fan of triangles and can be sewn.
+    assert!(mesh(&cone, 0.02).is_ok());
+}
+
+#[test]
+fn any_star_is_meshed_or_told_what_is_wrong() {
+    let mut meshed = 0;
+    for seed in 0..200 {
+        let star = pattern(vec![star(seed)], vec![]);
+        match mesh(&star, 0.02) {
+            Ok(mesh) => {
+                let positive = |t| mesh.rest_area(t, &mesh.x_bar) > 0.0;
+                assert!((0..mesh.triangles.len()).all(positive), "star {seed}");
+                meshed += 1;
+            }
+            Err(problems) => assert!(!problems.is_empty() && seed % 2 == 1, "{problems:?}"),
+        }
+    }
+    // Straight stars are simple, so all are meshed; curved ones often cross themselves.
+    assert!((100..200).contains(&meshed), "{meshed}");
+}
+
+/// A panel with 5 to 23 corners around a centre, 5 mm to 25 cm away; every other has curved edges.
+fn star(seed: usize) -> Panel {
+    let count = 5 + seed % 19;
+    let random = |i: usize| 0.5 + 0.5 * noise(1000 * seed + i);
+    let corner = |i: usize| {
+        let angle = std::f64::consts::TAU * (i as f64 + 0.8 * random(count + i)) / count as f64;
+        let radius = 0.005 + 0.245 * random(i).powi(2);
+        (radius * angle.cos(), radius * angle.sin())
+    };
+    let mut star = panel("star", &(0..count).map(corner).collect::<Vec<_>>());
+    if seed % 2 == 1 {
+        for e in 0..count {
+            let (a, b) = star.ends(e);
+            let bulge = Vec2::new(noise(3 * e + seed), noise(5 * e + seed));
+            star.edges[e].curve = Curve::Quadratic((a + b) * 0.5 + 0.3 * (b - a).norm() * bulge);
+        }
+    }
+    star
 }
