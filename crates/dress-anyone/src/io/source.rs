@@ -1,12 +1,13 @@
 //! What every reader shares: the bytes of a file within reason, and a list of problems that does
 //! not drown its reader.
 
+use super::file::{MEBIBYTE, read_capped};
 use crate::geometry::Vec3;
 use crate::problem::{BadInput, Problem};
 use std::path::Path;
 
 /// Larger files are refused: no body or garment needs a gibibyte, and a mistaken file may.
-const MAX_BYTES: u64 = 1 << 30;
+const MAX_BYTES: u64 = 1024 * MEBIBYTE;
 
 /// Problems shown before the rest is only counted.
 const MAX_SHOWN: usize = 20;
@@ -16,21 +17,9 @@ const MAX_COORDINATE: f64 = 1e12;
 
 /// The content of `path`.
 pub(crate) fn bytes(path: &Path) -> Result<Vec<u8>, BadInput> {
-    let refuse = |text: String| BadInput::one(path, Problem::whole(text));
-    let cannot = |e: std::io::Error| refuse(format!("cannot be read: {e}"));
-    let about = std::fs::metadata(path).map_err(cannot)?;
-    if !about.is_file() {
-        return Err(refuse("is not a file".into()));
-    }
-    if about.len() > MAX_BYTES {
-        let mib = about.len() >> 20;
-        return Err(refuse(format!(
-            "is {mib} MiB large; files up to 1024 MiB are read: decimate the mesh"
-        )));
-    }
-    let bytes = std::fs::read(path).map_err(cannot)?;
+    let bytes = read_capped(path, MAX_BYTES)?;
     if bytes.is_empty() {
-        return Err(refuse("the file is empty".into()));
+        return Err(BadInput::one(path, Problem::whole("the file is empty")));
     }
     Ok(bytes)
 }
