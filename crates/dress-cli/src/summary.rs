@@ -98,7 +98,7 @@ fn panels(panels: &[PanelReport]) -> String {
     let width = panels.iter().map(|p| p.panel.chars().count()).max();
     let width = width.unwrap_or(0).max("panel".len());
     let mut text = format!(
-        "  {:width$}  {:^26}  {:^22}\n",
+        "  {:width$}  {:>26}  {:>26}\n",
         "panel", "area [cm2]", "outline [cm]"
     );
     for panel in panels {

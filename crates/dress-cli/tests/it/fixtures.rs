@@ -66,34 +66,34 @@ impl Workplace {
     }
 }
 
-/// Two squares of 40 cm, sewn at one side, waiting above the body's top.
+/// Two squares of 14 cm, sewn at one side, waiting above the body's top.
 pub(crate) fn garment() -> Value {
     let square = |x: f64| {
         json!({
-            "vertices": [[0, 0], [40, 0], [40, 40], [0, 40]],
+            "vertices": [[0, 0], [14, 0], [14, 14], [0, 14]],
             "edges": [
                 {"endpoints": [0, 1]}, {"endpoints": [1, 2]},
                 {"endpoints": [2, 3]}, {"endpoints": [3, 0]},
             ],
-            "translation": [x, 161, 20],
+            "translation": [x, 111, 7],
             "rotation": [-90, 0, 0],
         })
     };
     json!({
         "pattern": {
-            "panels": {"left": square(0.0), "right": square(-40.0)},
+            "panels": {"left": square(0.0), "right": square(-14.0)},
             "stitches": [[{"panel": "left", "edge": 3}, {"panel": "right", "edge": 1}]],
         },
         "properties": {"units_in_meter": 100, "curvature_coords": "relative"},
     })
 }
 
-/// A box 1.6 m tall and 1 m wide and deep, as OBJ in metres.
+/// A box 1.1 m tall and 0.3 m wide and deep, as OBJ in metres.
 pub(crate) fn body() -> String {
     let mut text = String::new();
     for i in 0..8 {
         let side = |bit: i32| f64::from((i >> bit) & 1);
-        let (x, y, z) = (side(0) - 0.5, 1.6 * side(1), side(2) - 0.5);
+        let (x, y, z) = (0.3 * side(0) - 0.15, 1.1 * side(1), 0.3 * side(2) - 0.15);
         writeln!(text, "v {x} {y} {z}").unwrap();
     }
     text + "f 1 3 4 2\nf 5 6 8 7\nf 1 2 6 5\nf 3 7 8 4\nf 1 5 7 3\nf 2 4 8 6\n"

@@ -25,7 +25,7 @@ fn printed_parameters_are_the_defaults_when_read_back() {
         ("without", &[]),
     ] {
         let line = ["drape", "--garment", "tee.json", "--body", "body.obj"];
-        let coarse = ["--resolution", "100", "--quiet", "--out", folder];
+        let coarse = ["--resolution", "35", "--quiet", "--out", folder];
         let ran = place.dress(&[&line, &coarse, more].concat());
         assert_eq!(ran.code, 0, "{}", ran.stderr);
         assert_eq!((ran.stdout, ran.stderr), (String::new(), String::new()));
@@ -50,7 +50,7 @@ fn a_cloth_laid_on_a_box_is_draped_and_told_of() {
         "--out",
         "out",
     ];
-    let ran = place.dress(&[&line[..], &["--resolution", "100", "--threads", "1"]].concat());
+    let ran = place.dress(&[&line[..], &["--resolution", "35", "--threads", "1"]].concat());
     assert_eq!(ran.code, 0, "{}", ran.stderr);
     assert!(ran.stdout.contains("at rest"), "{}", ran.stdout);
     let report = report(&place);
