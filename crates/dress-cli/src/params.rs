@@ -329,10 +329,10 @@ mod tests {
             [
                 "key `fabric.bendign`: there is no such key; did you mean `bending`?",
                 "key `fabric.drag`: there is no such key here; it belongs to [sim.step]",
-                "key `verbosity`: there is no such key; known here: `cage`, `descent`, `fabric`, \
-                 `hold`, `loss`, `outline_tolerance`, `read`, `sim`, `symmetry`, `transfer`",
                 "key `read.bananas`: there is no such key; known here: `panel_rotation`, \
                  `resolution`",
+                "key `verbosity`: there is no such key; known here: `cage`, `descent`, `fabric`, \
+                 `hold`, `loss`, `outline_tolerance`, `read`, `sim`, `symmetry`, `transfer`",
             ]
         );
     }
