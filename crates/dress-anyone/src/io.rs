@@ -2,6 +2,7 @@
 
 pub mod body;
 pub mod file;
+pub mod garment;
 pub mod garment_obj;
 pub mod garmentcode;
 pub mod json;

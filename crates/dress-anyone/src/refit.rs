@@ -25,6 +25,7 @@ use crate::sim::equilibrium::RestStatus;
 use crate::sim::{Assembly, Cloth, Scene, SimParams, Start, drape};
 use crate::transfer::{TransferError, TransferParams, target_shape};
 use dress::{HoldParams, drape_on, holds};
+pub use measure::drape_report;
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
 
@@ -279,8 +280,8 @@ fn drape_to_rest(
     Ok(found.x)
 }
 
-/// Refuses a drape that is not nearly at rest.
-fn accept(found: &crate::sim::Drape, body: &Body) -> Result<(), RefitError> {
+/// Refuses a drape that is not nearly at rest on `body`.
+pub fn accept(found: &crate::sim::Drape, body: &Body) -> Result<(), RefitError> {
     let near = found.residual < NEARLY_AT_REST && found.status != RestStatus::Sliding;
     if found.status == RestStatus::AtRest || near {
         return Ok(());

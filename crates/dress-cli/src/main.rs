@@ -1,96 +1,74 @@
-//! harness
-#![allow(dead_code, unreachable_pub)]
+//! `dress`: refits sewing patterns and their drapes to any body.
+//!
+//! Results go to files and a summary to stdout; progress and problems go to stderr. The program
+//! ends with 0 when results are written, 2 when an input or the command line is bad, 130 when it
+//! was interrupted with nothing to write, and 1 when it failed by its own fault.
+#![expect(
+    unreachable_pub,
+    reason = "nothing of a program can be reached from outside"
+)]
+
+mod arguments;
+mod drape;
+mod failure;
+mod inputs;
+mod inspect;
 mod params;
 mod picture;
 mod progress;
-use dress_anyone::*;
-use std::path::Path;
-fn main() {
-    let a: Vec<String> = std::env::args().collect();
-    let spec = io::garmentcode::read(Path::new(&a[1]), &Default::default()).unwrap();
-    let body = io::body::read(Path::new(&a[2]), &Default::default()).unwrap();
-    let res: f64 = a[3].parse::<f64>().unwrap() / 1000.0;
-    let mesh = pattern::triangulate::mesh(&spec.pattern, res).unwrap();
-    println!(
-        "{} cloth vertices {} triangles; {:?}",
-        mesh.cloth_vertex_count,
-        mesh.triangles.len(),
-        body.notes
-    );
-    let garment = garment::Garment {
-        name: "g".into(),
-        pattern: spec.pattern,
-        mesh,
-        drape: None,
+mod refit;
+mod show;
+mod summary;
+
+use anyhow::Context;
+use arguments::{Arguments, Command, RunningArguments};
+use clap::Parser;
+use failure::Failure;
+use std::io::Write;
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    let arguments = Arguments::parse();
+    // A panic has told on stderr what and where; its exit status is that of any internal failure.
+    let done = std::panic::catch_unwind(|| run(&arguments.command)).unwrap_or_else(|_| {
+        let text = "this is a mistake of the program, not of your files; please report it";
+        Err(Failure::Internal(anyhow::anyhow!(text)))
+    });
+    match done {
+        Ok(text) => {
+            // Nobody may be there to read it, as with `| head`.
+            let _ = std::io::stdout().write_all(text.as_bytes());
+            ExitCode::SUCCESS
+        }
+        Err(failure) => {
+            let _ = writeln!(std::io::stderr(), "error: {failure}");
+            ExitCode::from(failure.code())
+        }
+    }
+}
+
+/// Does what was asked; what to say about it in the end.
+fn run(command: &Command) -> Result<String, Failure> {
+    match command {
+        Command::Refit(arguments) => {
+            set_threads(&arguments.running)?;
+            refit::run(arguments)
+        }
+        Command::Drape(arguments) => {
+            set_threads(&arguments.running)?;
+            drape::run(arguments)
+        }
+        Command::Inspect(arguments) => inspect::run(arguments),
+        Command::Params => Ok(params::TEMPLATE.to_owned()),
+    }
+}
+
+fn set_threads(running: &RunningArguments) -> anyhow::Result<()> {
+    let Some(threads) = running.threads else {
+        return Ok(());
     };
-    let t = std::time::Instant::now();
-    let mut sim = sim::SimParams::default();
-    let get = |k: &str, d: f64| std::env::var(k).ok().map_or(d, |v| v.parse().unwrap());
-    sim.step.time = get("TIME", sim.step.time);
-    sim.step.dt = 1.0 / get("RATE", 1.0 / sim.step.dt);
-    sim.step.sweeps = get("SWEEPS", sim.step.sweeps as f64) as usize;
-    sim.step.drag = get("DRAG", sim.step.drag);
-    sim.equilibrium.cold = get("COLD", sim.equilibrium.cold);
-    sim.equilibrium.iterations = get("ITER", sim.equilibrium.iterations as f64) as usize;
-    let d = refit::dress::drape_on(
-        &garment,
-        &body,
-        &Default::default(),
-        &Default::default(),
-        &sim,
-        &mut |p| {
-            match p {
-                sim::drape::DrapeProgress::Gathering { step, steps } => {
-                    if step % 60 == 0 {
-                        println!("{:.1}s gather {step}/{steps}", t.elapsed().as_secs_f64())
-                    }
-                }
-                sim::drape::DrapeProgress::Settling {
-                    iteration,
-                    residual,
-                } => {
-                    if iteration % 10 == 0 {
-                        println!(
-                            "{:.1}s settle {iteration} {residual:.3e}",
-                            t.elapsed().as_secs_f64()
-                        )
-                    }
-                }
-            }
-            true
-        },
-    );
-    println!(
-        "{:.1}s {:?} residual {:.2e} iterations {}",
-        t.elapsed().as_secs_f64(),
-        d.status,
-        d.residual,
-        d.iterations
-    );
-    let tri = garment.mesh.outward_triangles();
-    let pot = picture::panel_of_triangle(&garment.mesh);
-    let se = picture::seam_edges(&garment.mesh);
-    let placed = garment.placed();
-    let fig = |c, x| picture::Figure {
-        caption: c,
-        body: &body.mesh,
-        cloth_positions: x,
-        cloth_triangles: &tri,
-        panel_of_triangle: &pot,
-        seam_edges: &se,
-        scalar: None,
-    };
-    std::fs::write(
-        &a[4],
-        picture::preview(
-            "drape",
-            &[fig("placed", &placed), fig("drape", &d.x)],
-            &[
-                picture::View::Front,
-                picture::View::Back,
-                picture::View::ThreeQuarter,
-            ],
-        ),
-    )
-    .unwrap();
+    rayon::ThreadPoolBuilder::new()
+        .num_threads(threads.get())
+        .build_global()
+        .context("the threads cannot be started")
 }

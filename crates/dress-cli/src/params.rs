@@ -1,46 +1,143 @@
-//! Parameter files: the commented defaults, and reading a user's own.
+//! Parameters: the commented defaults, and reading a user's own.
 //!
-//! [`TEMPLATE`] is what `dress params` prints. It is written by hand; a test holds it to the
-//! defaults of the parameter structs: same values, every key, each with a comment above it.
+//! A file has the tables of [`RefitParams`] at its top, and `[read]`. [`TEMPLATE`] is what
+//! `dress params` prints; it is written by hand, and a test holds it to the defaults of the structs:
+//! same values, every key, each with a comment above it.
 
+use dress_anyone::io::file::{MEBIBYTE, read_capped};
+use dress_anyone::io::garmentcode::RotationOrder;
 use dress_anyone::problem::{BadInput, Problem};
-use serde::Serialize;
-use serde::de::DeserializeOwned;
+use dress_anyone::refit::RefitParams;
+use serde::{Deserialize, Serialize};
 use std::path::Path;
+use toml::de::{DeTable, Deserializer, ValueDeserializer};
 use toml::{Table, Value};
+
+/// All parameters of the program.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Params {
+    /// Reading files.
+    pub read: ReadParams,
+    /// Draping and refitting.
+    #[serde(flatten)]
+    pub refit: RefitParams,
+}
+
+/// What files leave open.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct ReadParams {
+    /// Length of mesh edges where a pattern has to be meshed \[m\].
+    pub resolution: f64,
+    /// How the angles of a GarmentCode panel combine.
+    pub panel_rotation: RotationOrder,
+}
+
+impl Default for ReadParams {
+    fn default() -> Self {
+        Self {
+            resolution: 0.02,
+            panel_rotation: RotationOrder::default(),
+        }
+    }
+}
 
 /// All parameters at their defaults, with what they mean.
 pub const TEMPLATE: &str = include_str!("params.toml");
 
+/// Parameter files are short.
+const LIMIT: u64 = MEBIBYTE;
+
+/// Numbers that must be above zero: others may be zero, and none is negative.
+const POSITIVE: [&str; 11] = [
+    "read.resolution",
+    "fabric.warp",
+    "fabric.weft",
+    "fabric.shear",
+    "fabric.density",
+    "sim.contact.stiffness",
+    "sim.step.dt",
+    "sim.step.speed",
+    "sim.equilibrium.step",
+    "transfer.tightness",
+    "descent.step",
+];
+
 /// The parameters in a TOML file; keys it leaves out keep their defaults.
-pub fn read_params<T>(path: &Path) -> Result<T, BadInput>
-where
-    T: Serialize + DeserializeOwned + Default,
-{
-    let text = std::fs::read_to_string(path).map_err(|error| {
-        let why = format!("cannot be read as text: {error}");
-        BadInput::one(path, Problem::whole(why))
-    })?;
-    parse_params(&text).map_err(|problems| BadInput::new(path, problems))
+pub fn read(path: &Path) -> Result<Params, BadInput> {
+    let bytes = read_capped(path, LIMIT)?;
+    let bad = |problems| BadInput::new(path, problems);
+    let text = String::from_utf8(bytes)
+        .map_err(|_| bad(vec![Problem::whole("this is no text; parameters are TOML")]))?;
+    parse(&text).map_err(bad)
 }
 
-/// [`read_params`] of a file's text.
-fn parse_params<T>(text: &str) -> Result<T, Vec<Problem>>
-where
-    T: Serialize + DeserializeOwned + Default,
-{
-    let error = match toml::from_str::<T>(text) {
-        Ok(params) => return Ok(params),
-        Err(error) => error,
-    };
+/// [`read`] of a file's text.
+fn parse(text: &str) -> Result<Params, Vec<Problem>> {
+    let given: Table = text
+        .parse()
+        .map_err(|error| vec![in_plain_words(text, &error)])?;
+    let known = defaults();
     let mut problems = Vec::new();
-    if let (Ok(given), Ok(known)) = (text.parse::<Table>(), Table::try_from(T::default())) {
-        unknown_keys(&given, &known, &mut Vec::new(), &known, &mut problems);
+    unknown_keys(&given, &known, &mut Vec::new(), &known, &mut problems);
+    numbers_out_of_range(&given, "", &mut problems);
+    if !problems.is_empty() {
+        return Err(problems);
     }
-    if problems.is_empty() {
-        problems.push(in_plain_words(text, &error));
+    typed(text).map_err(|error| vec![in_plain_words(text, &error)])
+}
+
+/// The parameters in `text`; errors know their place in it.
+fn typed(text: &str) -> Result<Params, toml::de::Error> {
+    let mut table = DeTable::parse(text)?;
+    let read = table.get_mut().remove("read");
+    Ok(Params {
+        read: match read {
+            Some(read) => ReadParams::deserialize(ValueDeserializer::from(read))?,
+            None => ReadParams::default(),
+        },
+        refit: RefitParams::deserialize(Deserializer::from(table))?,
+    })
+}
+
+/// All keys with their defaults.
+fn defaults() -> Table {
+    Table::try_from(Params::default()).expect("parameters are a table")
+}
+
+/// Numbers of `table`, called `name`, that are no amounts.
+fn numbers_out_of_range(table: &Table, name: &str, problems: &mut Vec<Problem>) {
+    for (key, value) in table {
+        let path = joined(name, key);
+        let number = match value {
+            Value::Table(inside) => {
+                numbers_out_of_range(inside, &path, problems);
+                continue;
+            }
+            Value::Float(number) => *number,
+            Value::Integer(number) => *number as f64,
+            _ => continue,
+        };
+        let positive = POSITIVE.contains(&path.as_str());
+        if !number.is_finite() || number < 0.0 || (positive && number == 0.0) {
+            let wanted = if positive {
+                "above zero"
+            } else {
+                "zero or above"
+            };
+            let text = format!("`{number}` must be a finite number, {wanted}");
+            problems.push(Problem::at(format!("key `{path}`"), text));
+        }
     }
-    Err(problems)
+}
+
+/// "table.key", or the key alone at the top.
+fn joined(table: &str, key: &str) -> String {
+    if table.is_empty() {
+        key.to_owned()
+    } else {
+        format!("{table}.{key}")
+    }
 }
 
 /// Keys of `given` that `known`, the table at `path` of all `defaults`, does not have.
@@ -104,8 +201,7 @@ fn tables_with(key: &str, table: &Table, name: &str) -> Vec<String> {
     }
     for (inner, value) in table {
         if let Value::Table(inside) = value {
-            let dot = if name.is_empty() { "" } else { "." };
-            found.extend(tables_with(key, inside, &format!("{name}{dot}{inner}")));
+            found.extend(tables_with(key, inside, &joined(name, inner)));
         }
     }
     found
@@ -142,39 +238,13 @@ fn edit_distance(a: &str, b: &str) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use dress_anyone::garment::Fabric;
-    use serde::Deserialize;
+    use dress_anyone::transfer::Ease;
 
-    /// Stands for the parameters of the whole program.
-    #[derive(Debug, Default, PartialEq, Serialize, Deserialize)]
-    #[serde(default, deny_unknown_fields)]
-    struct Params {
-        fabric: Fabric,
-    }
-
-    #[derive(Debug, Default, PartialEq, Serialize, Deserialize)]
-    #[serde(default, deny_unknown_fields)]
-    struct Sim {
-        steps: usize,
-        damping: f64,
-    }
-
-    #[derive(Debug, Default, PartialEq, Serialize, Deserialize)]
-    #[serde(default, deny_unknown_fields)]
-    struct Nested {
-        quiet: bool,
-        sim: Sim,
-        fabric: Fabric,
-    }
-
-    /// What is wrong with a template of `T`'s defaults.
-    fn template_problems<T>(template: &str) -> Vec<String>
-    where
-        T: Serialize + DeserializeOwned + Default + PartialEq,
-    {
+    /// What is wrong with a template.
+    fn template_problems(template: &str) -> Vec<String> {
         let mut problems = Vec::new();
-        match parse_params::<T>(template) {
-            Ok(params) if params == T::default() => {}
+        match parse(template) {
+            Ok(params) if params == Params::default() => {}
             Ok(_) => problems.push("a value differs from the default".to_owned()),
             Err(errors) => problems.extend(errors.iter().map(ToString::to_string)),
         }
@@ -185,13 +255,11 @@ mod tests {
                 name.clone_into(&mut table);
                 explained.extend(commented.then(|| name.to_owned()));
             } else if let Some((key, _)) = line.split_once('=').filter(|_| !line.starts_with('#')) {
-                let dot = if table.is_empty() { "" } else { "." };
-                explained.extend(commented.then(|| format!("{table}{dot}{}", key.trim())));
+                explained.extend(commented.then(|| joined(&table, key.trim())));
             }
             above = line;
         }
-        let defaults = Table::try_from(T::default()).expect("parameters are a table");
-        for key in all_keys(&defaults, "") {
+        for key in all_keys(&defaults(), "") {
             if !explained.contains(&key) {
                 problems.push(format!("`{key}` is missing, or has no comment above it"));
             }
@@ -202,8 +270,7 @@ mod tests {
     fn all_keys(table: &Table, name: &str) -> Vec<String> {
         let mut keys = Vec::new();
         for (key, value) in table {
-            let dot = if name.is_empty() { "" } else { "." };
-            let path = format!("{name}{dot}{key}");
+            let path = joined(name, key);
             if let Value::Table(inside) = value {
                 keys.extend(all_keys(inside, &path));
             }
@@ -212,65 +279,93 @@ mod tests {
         keys
     }
 
+    fn lines_of(text: &str) -> Vec<String> {
+        let problems = parse(text).expect_err("bad parameters");
+        problems.iter().map(ToString::to_string).collect()
+    }
+
     #[test]
     fn the_template_says_the_defaults_and_explains_every_key() {
-        assert_eq!(template_problems::<Params>(TEMPLATE), [""; 0]);
+        assert_eq!(template_problems(TEMPLATE), [""; 0]);
     }
 
     #[test]
     fn a_template_with_a_gap_is_found_out() {
-        let without_comment = "# Sim.\n[sim]\nsteps = 0\n# Damping.\ndamping = 0.0\n";
+        let bare = TEMPLATE.replace("drag = ", "\ndrag = ");
         assert_eq!(
-            template_problems::<Sim>("# Steps.\nsteps = 0\ndamping = 0.0\n"),
-            ["`damping` is missing, or has no comment above it"]
+            template_problems(&bare),
+            ["`sim.step.drag` is missing, or has no comment above it"]
         );
+        let other = TEMPLATE.replace("symmetry = true", "symmetry = false");
         assert_eq!(
-            template_problems::<Sim>("# Steps.\nsteps = 1\n# Damping.\ndamping = 0.0\n"),
+            template_problems(&other),
             ["a value differs from the default"]
         );
-        let problems = template_problems::<Nested>(without_comment);
-        assert!(problems[0].contains("`fabric.bending`"), "{problems:?}");
-        assert!(problems.iter().any(|p| p.starts_with("`sim.steps`")));
     }
 
     #[test]
     fn keys_left_out_keep_their_defaults() {
-        let params: Nested = parse_params("[sim]\nsteps = 7\n").expect("good parameters");
-        assert_eq!((params.sim.steps, params.fabric), (7, Fabric::default()));
+        let params = parse("[sim.step]\nsweeps = 7\n").expect("good parameters");
+        let mut expected = Params::default();
+        expected.refit.sim.step.sweeps = 7;
+        assert_eq!(params, expected);
         // A whole number where a fraction is expected is fine.
-        let params: Nested = parse_params("fabric.warp = 500").expect("good parameters");
-        assert_eq!(params.fabric.warp, 500.0);
+        let params = parse("fabric.warp = 500").expect("good parameters");
+        assert_eq!(params.refit.fabric.warp, 500.0);
+    }
+
+    #[test]
+    fn ease_is_a_word_or_a_blend() {
+        let ease = |text: &str| parse(text).expect("good parameters").refit.transfer.ease;
+        assert_eq!(ease("transfer.ease = \"relative\""), Ease::Relative);
+        assert_eq!(ease("transfer.ease = { blend = 0.5 }"), Ease::Blend(0.5));
     }
 
     #[test]
     fn every_unknown_key_is_named_with_advice() {
-        let text = "loud = true\n[fabric]\nbendign = 1e-5\ndamping = 0.1\n[sim]\nbananas = 3\n";
-        let problems = parse_params::<Nested>(text).expect_err("four unknown keys");
-        let lines: Vec<String> = problems.iter().map(ToString::to_string).collect();
+        let text = "verbosity = 1\n[fabric]\nbendign = 1e-5\ndrag = 0.1\n[read]\nbananas = 3\n";
         assert_eq!(
-            lines,
+            lines_of(text),
             [
                 "key `fabric.bendign`: there is no such key; did you mean `bending`?",
-                "key `fabric.damping`: there is no such key here; it belongs to [sim]",
-                "key `loud`: there is no such key; known here: `fabric`, `quiet`, `sim`",
-                "key `sim.bananas`: there is no such key; known here: `damping`, `steps`",
+                "key `fabric.drag`: there is no such key here; it belongs to [sim.step]",
+                "key `read.bananas`: there is no such key; known here: `panel_rotation`, \
+                 `resolution`",
+                "key `verbosity`: there is no such key; known here: `cage`, `descent`, `fabric`, \
+                 `hold`, `loss`, `outline_tolerance`, `read`, `sim`, `symmetry`, `transfer`",
             ]
         );
     }
 
     #[test]
     fn a_wrong_value_is_told_with_its_line() {
-        let problems = parse_params::<Nested>("# a\n[sim]\nsteps = \"many\"\n").expect_err("words");
-        assert_eq!(problems[0].place, "line 3");
-        let problems = parse_params::<Nested>("[sim\n").expect_err("no TOML");
-        assert_eq!(problems[0].place, "line 1");
+        for (text, line) in [
+            ("# a\n[sim.step]\nsweeps = \"many\"\n", "line 3"),
+            ("[read]\nresolution = \"fine\"\n", "line 2"),
+            ("[sim\n", "line 1"),
+        ] {
+            assert_eq!(parse(text).expect_err("bad parameters")[0].place, line);
+        }
     }
 
     #[test]
-    fn a_file_that_is_not_there_is_bad_input() {
-        let folder = tempfile::tempdir().expect("a folder");
-        let error = read_params::<Params>(&folder.path().join("none.toml")).expect_err("no file");
-        assert!(error.to_string().contains("none.toml: cannot be read"));
+    fn numbers_that_are_no_amounts_are_refused() {
+        assert_eq!(
+            lines_of("[read]\nresolution = 0\n[loss]\nseam = nan\narea = -1\ninterior = 0\n"),
+            [
+                "key `loss.area`: `-1` must be a finite number, zero or above",
+                "key `loss.seam`: `NaN` must be a finite number, zero or above",
+                "key `read.resolution`: `0` must be a finite number, above zero",
+            ]
+        );
+    }
+
+    #[test]
+    fn every_key_that_must_be_positive_exists() {
+        let keys = all_keys(&defaults(), "");
+        for key in POSITIVE {
+            assert!(keys.iter().any(|known| known == key), "{key}");
+        }
     }
 
     #[test]

@@ -2,6 +2,8 @@
 //!
 //! On a terminal one line is rewritten in place; in a log every event is a line of its own.
 
+use dress_anyone::refit;
+use dress_anyone::sim::drape::DrapeProgress;
 use std::io::{self, IsTerminal, Write};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -15,6 +17,8 @@ pub struct Progress<W = io::Stderr> {
     stage: String,
     /// Whether an unfinished line stands on the terminal.
     open: bool,
+    /// When something passing was last told.
+    passed: Instant,
 }
 
 /// How events are told.
@@ -51,27 +55,64 @@ impl<W: Write> Progress<W> {
             start: Instant::now(),
             stage: String::new(),
             open: false,
+            passed: Instant::now(),
         }
+    }
+
+    /// What a refit tells.
+    pub fn event(&mut self, event: &refit::Progress) {
+        match event {
+            refit::Progress::Stage(name) => self.stage(name),
+            refit::Progress::Drape(drape) => self.drape(*drape),
+            refit::Progress::Iteration {
+                iteration, loss, ..
+            } => self.iteration(*iteration, *loss),
+        }
+    }
+
+    /// How far a drape is, now and then.
+    pub fn drape(&mut self, drape: DrapeProgress) {
+        let pause = match self.manner {
+            Manner::Quiet => return,
+            Manner::Lines => Duration::from_secs(10),
+            Manner::Terminal => Duration::from_millis(100),
+        };
+        if self.passed.elapsed() < pause {
+            return;
+        }
+        self.passed = Instant::now();
+        let doing = match drape {
+            DrapeProgress::Gathering { step, steps } => format!("gathering, {step} of {steps}"),
+            DrapeProgress::Settling {
+                iteration,
+                residual,
+            } => format!("settling, {iteration}: net force {residual:.1e} of the weight"),
+        };
+        let text = line(&self.stage, &doing, self.start.elapsed());
+        self.tell(&text);
     }
 
     /// A stage of the work begins.
     pub fn stage(&mut self, name: &str) {
         self.close();
         name.clone_into(&mut self.stage);
-        self.tell(&line(name, None, self.start.elapsed()));
+        self.tell(&line(name, "", self.start.elapsed()));
     }
 
     /// An iteration of the current stage ended at this loss.
     pub fn iteration(&mut self, iteration: usize, loss: f64) {
-        let text = line(&self.stage, Some((iteration, loss)), self.start.elapsed());
+        let doing = format!("iteration {iteration}, loss {loss:.4e}");
+        let text = line(&self.stage, &doing, self.start.elapsed());
         self.tell(&text);
     }
 
-    /// Something to keep on the screen, such as a file that was written.
-    pub fn note(&mut self, text: &str) {
-        self.close();
-        self.tell(text);
-        self.close();
+    /// What was noticed when reading the input called `name`; this stays on the screen.
+    pub fn notes(&mut self, name: &str, notes: &[String]) {
+        for note in notes {
+            self.close();
+            self.tell(&format!("{name}: {note}"));
+            self.close();
+        }
     }
 
     /// Ends the line that was being rewritten.
@@ -101,13 +142,10 @@ impl<W: Write> Progress<W> {
     }
 }
 
-/// "   12.3 s  refit: iteration 7, loss 1.234e-3".
-fn line(stage: &str, iteration: Option<(usize, f64)>, elapsed: Duration) -> String {
-    let seconds = elapsed.as_secs_f64();
-    match iteration {
-        Some((i, loss)) => format!("{seconds:7.1} s  {stage}: iteration {i}, loss {loss:.4e}"),
-        None => format!("{seconds:7.1} s  {stage}"),
-    }
+/// "   12.3 s  search: iteration 7, loss 1.234e-3".
+fn line(stage: &str, doing: &str, elapsed: Duration) -> String {
+    let colon = if doing.is_empty() { "" } else { ": " };
+    format!("{:7.1} s  {stage}{colon}{doing}", elapsed.as_secs_f64())
 }
 
 /// A flag that the first Ctrl-C raises; the second ends the program at once.
@@ -119,7 +157,8 @@ pub fn stop_on_ctrl_c() -> Result<Arc<AtomicBool>, ctrlc::Error> {
             // What shells report of a program ended by Ctrl-C: 128 + SIGINT.
             std::process::exit(130);
         }
-        let text = "\nstopping after this iteration; press Ctrl-C again to stop at once\n";
+        let text =
+            "\nstopping; what was found so far will be written (Ctrl-C again: stop at once)\n";
         let _ = io::stderr().write_all(text.as_bytes());
     })?;
     Ok(stop)
@@ -139,7 +178,7 @@ mod tests {
         let mut progress = Progress::to(&mut out, manner);
         progress.stage("refit");
         progress.iteration(1, 0.5);
-        progress.note("wrote sheet.png");
+        progress.notes("tee", &["unit: cm".to_owned()]);
         progress.close();
         String::from_utf8(out).expect("text")
     }
@@ -160,7 +199,18 @@ mod tests {
             .filter_map(|line| line.rsplit('\r').next())
             .collect();
         assert_eq!(kept.len(), 2, "{screen:?}");
-        assert!(kept[0].contains("iteration 1") && kept[1].starts_with("wrote sheet.png"));
+        assert!(kept[0].contains("iteration 1") && kept[1].starts_with("tee: unit: cm"));
+    }
+
+    #[test]
+    fn a_log_hears_of_a_drape_only_now_and_then() {
+        let mut out = Vec::new();
+        let mut progress = Progress::to(&mut out, Manner::Lines);
+        for step in 0..1000 {
+            progress.drape(DrapeProgress::Gathering { step, steps: 1000 });
+        }
+        // Ten seconds between lines, and this takes none.
+        assert!(out.is_empty());
     }
 
     #[test]
@@ -170,7 +220,7 @@ mod tests {
 
     #[test]
     fn elapsed_time_leads_the_line() {
-        let text = line("drape", None, Duration::from_millis(12_340));
+        let text = line("drape", "", Duration::from_millis(12_340));
         assert_eq!(text, "   12.3 s  drape");
     }
 

@@ -28,12 +28,16 @@ pub struct BodyOptions {
 
 /// Reads a body from an OBJ, PLY or STL file.
 pub fn read(path: &Path, options: &BodyOptions) -> Result<Body, BadInput> {
-    let bytes = source::bytes(path)?;
-    let bad = |problems| BadInput::new(path, problems);
-    let surface = surface_of(&bytes, path).map_err(bad)?;
+    parse(path, &source::bytes(path)?, options)
+}
+
+/// [`read`] of a file's bytes; `file` gives the body its name.
+pub fn parse(file: &Path, bytes: &[u8], options: &BodyOptions) -> Result<Body, BadInput> {
+    let bad = |problems| BadInput::new(file, problems);
+    let surface = surface_of(bytes, file).map_err(bad)?;
     let (mesh, frame, notes) = stand_up(&surface, options).map_err(|p| bad(vec![p]))?;
     Ok(Body {
-        name: source::stem(path),
+        name: source::stem(file),
         mesh,
         frame,
         notes,

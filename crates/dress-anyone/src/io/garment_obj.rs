@@ -47,10 +47,14 @@ pub struct ObjGarment {
 
 /// Reads a drape whose texture coordinates are its pattern.
 pub fn read(path: &Path, options: &UvOptions) -> Result<ObjGarment, BadInput> {
-    let bytes = source::bytes(path)?;
-    let document = obj::parse(&bytes).map_err(|problems| BadInput::new(path, problems))?;
-    assemble(document, source::stem(path), options)
-        .map_err(|problems| BadInput::new(path, problems))
+    parse(path, &source::bytes(path)?, options)
+}
+
+/// [`read`] of a file's bytes; `file` gives the garment its name.
+pub fn parse(file: &Path, bytes: &[u8], options: &UvOptions) -> Result<ObjGarment, BadInput> {
+    obj::parse(bytes)
+        .and_then(|document| assemble(document, source::stem(file), options))
+        .map_err(|problems| BadInput::new(file, problems))
 }
 
 fn assemble(

@@ -116,7 +116,8 @@ fn distances(x: &[Vec3], y: &[Vec3]) -> [f64; 2] {
     ]
 }
 
-/// A drape against the body's exact mesh and its own rest shape.
+/// A drape against the body's exact mesh and its own rest shape; without the search that found it,
+/// it counts as at rest.
 pub fn drape_report(
     mesh: &PatternMesh,
     x_bar: &[Vec2],

@@ -1,0 +1,322 @@
+//! The command line.
+
+use crate::params::{self, Params};
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use dress_anyone::body::UpAxis;
+use dress_anyone::cage::CageKind;
+use dress_anyone::io::body::BodyOptions;
+use dress_anyone::io::garment::GarmentOptions;
+use dress_anyone::io::garment_obj::UvOptions;
+use dress_anyone::io::garmentcode::RotationOrder;
+use dress_anyone::problem::BadInput;
+use std::num::NonZeroUsize;
+use std::path::PathBuf;
+
+/// Refits sewing patterns, and their drapes, to any body.
+#[derive(Debug, Parser)]
+#[command(name = "dress", version, arg_required_else_help = true)]
+pub struct Arguments {
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+/// What to do.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Refit a garment from the body it fits to another one.
+    Refit(RefitArguments),
+    /// Drape a garment on a body.
+    Drape(DrapeArguments),
+    /// Tell what is in a garment or body file, and what is wrong with it.
+    Inspect(InspectArguments),
+    /// Print all parameters with their defaults and what they do, as TOML.
+    Params,
+}
+
+/// `dress refit`.
+#[derive(Debug, Args)]
+pub struct RefitArguments {
+    /// GarmentCode pattern (JSON), or drape in OBJ with its pattern as texture coordinates
+    /// [default: a T-shirt that is built in]
+    #[arg(long, value_name = "FILE", requires = "source_body")]
+    pub garment: Option<PathBuf>,
+    /// The body that the garment fits (OBJ, PLY, STL) [default: built in]
+    #[arg(long, value_name = "FILE", requires = "target_body")]
+    pub source_body: Option<PathBuf>,
+    /// The body that it shall fit, vertex by vertex the same mesh [default: built in]
+    #[arg(long, value_name = "FILE")]
+    pub target_body: Option<PathBuf>,
+    /// Folder for the results
+    #[arg(long, value_name = "FOLDER", default_value = "dress-out")]
+    pub out: PathBuf,
+    /// What the cages that deform the panels can do
+    #[arg(long, value_name = "KIND")]
+    pub cage: Option<Cage>,
+    /// Let mirrored panels become unlike each other
+    #[arg(long)]
+    pub no_symmetry: bool,
+    /// How to read the files.
+    #[command(flatten)]
+    pub reading: ReadingArguments,
+    /// How to run.
+    #[command(flatten)]
+    pub running: RunningArguments,
+}
+
+/// `dress drape`.
+#[derive(Debug, Args)]
+pub struct DrapeArguments {
+    /// GarmentCode pattern (JSON), or drape in OBJ with its pattern as texture coordinates
+    #[arg(long, value_name = "FILE")]
+    pub garment: PathBuf,
+    /// The body to drape it on (OBJ, PLY, STL)
+    #[arg(long, value_name = "FILE")]
+    pub body: PathBuf,
+    /// Folder for the results
+    #[arg(long, value_name = "FOLDER", default_value = "dress-out")]
+    pub out: PathBuf,
+    /// How to read the files.
+    #[command(flatten)]
+    pub reading: ReadingArguments,
+    /// How to run.
+    #[command(flatten)]
+    pub running: RunningArguments,
+}
+
+/// `dress inspect`.
+#[derive(Debug, Args)]
+pub struct InspectArguments {
+    /// A garment (JSON, OBJ with texture coordinates) or a body (OBJ, PLY, STL)
+    #[arg(value_name = "FILE")]
+    pub file: PathBuf,
+    /// What the file is [default: patterns and open textured meshes are garments]
+    #[arg(long = "as", value_name = "KIND")]
+    pub kind: Option<Kind>,
+    /// How to read the file.
+    #[command(flatten)]
+    pub reading: ReadingArguments,
+}
+
+/// How to run.
+#[derive(Debug, Args)]
+pub struct RunningArguments {
+    /// Number of threads [default: one per core]
+    #[arg(long, value_name = "N")]
+    pub threads: Option<NonZeroUsize>,
+    /// Say nothing unless something is wrong
+    #[arg(long)]
+    pub quiet: bool,
+}
+
+/// How to read files. What is given here overrides the parameter file, which overrides guesses.
+#[derive(Debug, Args)]
+pub struct ReadingArguments {
+    /// Parameters (TOML); `dress params` prints them all
+    #[arg(long, value_name = "FILE")]
+    pub params: Option<PathBuf>,
+    /// Length of mesh edges, where a pattern has to be meshed [default: 20]
+    #[arg(long, value_name = "MM", value_parser = positive)]
+    pub resolution: Option<f64>,
+    /// How the three angles of a GarmentCode panel combine [default: extrinsic]
+    #[arg(long, value_name = "ORDER")]
+    pub panel_rotation: Option<Rotation>,
+    /// Length of one unit of an OBJ garment's texture coordinates [default: measured]
+    #[arg(long, value_name = "METRES", value_parser = positive)]
+    pub uv_scale: Option<f64>,
+    /// Unit of an OBJ garment [default: guessed from its size]
+    #[arg(long, value_name = "UNIT")]
+    pub garment_unit: Option<Unit>,
+    /// Axis that points up in an OBJ garment [default: guessed]
+    #[arg(long, value_name = "AXIS")]
+    pub garment_up: Option<Up>,
+    /// Unit of the body files [default: guessed from their heights]
+    #[arg(long, value_name = "UNIT")]
+    pub body_unit: Option<Unit>,
+    /// Axis that points up in the body files [default: guessed]
+    #[arg(long, value_name = "AXIS")]
+    pub body_up: Option<Up>,
+}
+
+/// What a file is.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub enum Kind {
+    /// A garment
+    Garment,
+    /// A body
+    Body,
+}
+
+/// [`CageKind`].
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub enum Cage {
+    /// Keeps all angles, as in the paper
+    Green,
+    /// May stretch and shear each panel as a whole, too
+    GreenAffine,
+}
+
+/// [`RotationOrder`].
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub enum Rotation {
+    /// About axes that turn along
+    Intrinsic,
+    /// About fixed axes
+    Extrinsic,
+}
+
+/// A unit of length.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub enum Unit {
+    /// Metres
+    M,
+    /// Decimetres
+    Dm,
+    /// Centimetres
+    Cm,
+    /// Millimetres
+    Mm,
+    /// Inches
+    In,
+}
+
+/// [`UpAxis`].
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub enum Up {
+    /// y
+    Y,
+    /// z
+    Z,
+}
+
+impl Unit {
+    fn metres(self) -> f64 {
+        match self {
+            Self::M => 1.0,
+            Self::Dm => 0.1,
+            Self::Cm => 0.01,
+            Self::Mm => 0.001,
+            Self::In => 0.0254,
+        }
+    }
+}
+
+impl Up {
+    fn axis(self) -> UpAxis {
+        match self {
+            Self::Y => UpAxis::Y,
+            Self::Z => UpAxis::Z,
+        }
+    }
+}
+
+impl ReadingArguments {
+    /// The parameters: the file's, overridden by the command line.
+    pub fn params(&self) -> Result<Params, BadInput> {
+        let mut params = self
+            .params
+            .as_deref()
+            .map_or_else(|| Ok(Params::default()), params::read)?;
+        if let Some(millimetres) = self.resolution {
+            params.read.resolution = 1e-3 * millimetres;
+        }
+        match self.panel_rotation {
+            Some(Rotation::Intrinsic) => params.read.panel_rotation = RotationOrder::Intrinsic,
+            Some(Rotation::Extrinsic) => params.read.panel_rotation = RotationOrder::Extrinsic,
+            None => {}
+        }
+        Ok(params)
+    }
+
+    /// How to read the garment.
+    pub fn garment(&self, params: &Params) -> GarmentOptions {
+        GarmentOptions {
+            resolution: params.read.resolution,
+            rotation: params.read.panel_rotation,
+            uv: UvOptions {
+                uv_scale: self.uv_scale,
+                metres_per_unit: self.garment_unit.map(Unit::metres),
+                up: self.garment_up.map(Up::axis),
+            },
+        }
+    }
+
+    /// How to read bodies.
+    pub fn body(&self) -> BodyOptions {
+        BodyOptions {
+            metres_per_unit: self.body_unit.map(Unit::metres),
+            up: self.body_up.map(Up::axis),
+        }
+    }
+}
+
+impl RefitArguments {
+    /// The parameters: the file's, overridden by the command line.
+    pub fn params(&self) -> Result<Params, BadInput> {
+        let mut params = self.reading.params()?;
+        match self.cage {
+            Some(Cage::Green) => params.refit.cage.kind = CageKind::Green,
+            Some(Cage::GreenAffine) => params.refit.cage.kind = CageKind::GreenAffine,
+            None => {}
+        }
+        if self.no_symmetry {
+            params.refit.symmetry = false;
+        }
+        Ok(params)
+    }
+}
+
+/// A length or scale.
+fn positive(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(number) if number.is_finite() && number > 0.0 => Ok(number),
+        _ => Err("must be a number above zero".to_owned()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_command_line_is_well_formed() {
+        Arguments::command().debug_assert();
+    }
+
+    #[test]
+    fn options_override_the_parameters() {
+        let line = "dress refit --resolution 35 --cage green --no-symmetry \
+                    --panel-rotation intrinsic --body-unit in --body-up z";
+        let Command::Refit(refit) = Arguments::parse_from(line.split_whitespace()).command else {
+            panic!("not refit");
+        };
+        let params = refit.params().expect("good parameters");
+        // 35 mm.
+        assert!((params.read.resolution - 0.035).abs() < 1e-12);
+        assert_eq!(params.read.panel_rotation, RotationOrder::Intrinsic);
+        assert_eq!(params.refit.cage.kind, CageKind::Green);
+        assert!(!params.refit.symmetry);
+        let body = refit.reading.body();
+        assert_eq!(body.metres_per_unit, Some(0.0254));
+        assert_eq!(body.up, Some(UpAxis::Z));
+    }
+
+    #[test]
+    fn lengths_that_are_none_are_refused() {
+        for bad in ["0", "-3", "nan", "inf", "fine"] {
+            assert!(positive(bad).is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn a_garment_of_ones_own_needs_bodies_of_ones_own() {
+        for line in [
+            "dress refit --garment a.json",
+            "dress refit --garment a.json --target-body b.obj",
+            "dress refit --source-body b.obj",
+        ] {
+            assert!(Arguments::try_parse_from(line.split_whitespace()).is_err());
+        }
+    }
+}

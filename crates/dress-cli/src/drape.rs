@@ -1,0 +1,144 @@
+//! `dress drape`.
+
+use crate::arguments::DrapeArguments;
+use crate::failure::Failure;
+use crate::inputs::{Gathering, Input, InputReport};
+use crate::params::Params;
+use crate::picture::{View, pattern_png};
+use crate::progress::{Progress, stop_on_ctrl_c};
+use crate::refit::json;
+use crate::show::{Shown, contact_sheet};
+use crate::summary;
+use anyhow::Context;
+use dress_anyone::body::Body;
+use dress_anyone::io::garment::Loaded;
+use dress_anyone::io::output::{Output, check_writable};
+use dress_anyone::io::{garment_obj, svg};
+use dress_anyone::refit::dress::drape_on;
+use dress_anyone::refit::{RefitError, accept, drape_report};
+use dress_anyone::report::DrapeReport;
+use dress_anyone::sim::Drape;
+use dress_anyone::sim::equilibrium::RestStatus;
+use serde::Serialize;
+use std::sync::atomic::Ordering;
+use std::time::Instant;
+
+/// What happened.
+#[derive(Serialize)]
+struct Report<'a> {
+    garment: InputReport,
+    body: InputReport,
+    parameters: &'a Params,
+    version: &'static str,
+    /// Cloth vertices and triangles.
+    size: [usize; 2],
+    #[serde(flatten)]
+    drape: DrapeReport,
+    iterations: usize,
+    seconds: f64,
+}
+
+/// Drapes; what to say about it in the end.
+pub fn run(arguments: &DrapeArguments) -> Result<String, Failure> {
+    let (params, loaded, body) = read(arguments)?;
+    let garment = &loaded.garment;
+    let stop = stop_on_ctrl_c().context("Ctrl-C cannot be listened to")?;
+    let mut progress = Progress::new(arguments.running.quiet);
+    progress.notes(&garment.name, &loaded.notes);
+    progress.notes(&body.name, &body.notes);
+    progress.stage("drape");
+    let start = Instant::now();
+    let refit = &params.refit;
+    let found = drape_on(
+        garment,
+        &body,
+        &refit.fabric,
+        &refit.hold,
+        &refit.sim,
+        &mut |event| {
+            progress.drape(event);
+            !stop.load(Ordering::SeqCst)
+        },
+    );
+    let seconds = start.elapsed().as_secs_f64();
+    progress.close();
+    let accepted = accept(&found, &body);
+    if found.status == RestStatus::Stopped && accepted.is_err() {
+        return Err(RefitError::Stopped.into());
+    }
+    accepted?;
+
+    let mesh = &garment.mesh;
+    let report = Report {
+        garment: InputReport::of_garment(Input::File(&arguments.garment), &loaded),
+        body: InputReport::of_body(Input::File(&arguments.body), &body),
+        parameters: &params,
+        version: env!("CARGO_PKG_VERSION"),
+        size: [mesh.cloth_vertex_count, mesh.triangles.len()],
+        drape: drape_report(mesh, &mesh.x_bar, &found.x, &body, Some(&found)),
+        iterations: found.iterations,
+        seconds,
+    };
+    results(arguments, &loaded, &body, &found, &report)?.write()?;
+    if arguments.running.quiet {
+        return Ok(String::new());
+    }
+    Ok(format!(
+        "The drape is {} after {seconds:.1} s.\n{}Written to {}\n",
+        summary::rest(report.drape.status),
+        summary::penetration(&report.drape),
+        arguments.out.display()
+    ))
+}
+
+/// Reads all inputs before complaining of any.
+fn read(arguments: &DrapeArguments) -> Result<(Params, Loaded, Body), Failure> {
+    let mut gathering = Gathering::default();
+    let params = gathering.take(arguments.reading.params());
+    let options = arguments
+        .reading
+        .garment(params.as_ref().unwrap_or(&Params::default()));
+    let loaded = gathering.take(Input::File(&arguments.garment).garment(&options));
+    let body = gathering.take(Input::File(&arguments.body).body(&arguments.reading.body()));
+    gathering.take(check_writable(&arguments.out));
+    gathering.finish()?;
+    let all = params.zip(loaded).zip(body);
+    let ((params, loaded), body) = all.expect("nothing was wrong with any of them");
+    Ok((params, loaded, body))
+}
+
+/// All files of a drape, in the unit and axes of the body's.
+fn results(
+    arguments: &DrapeArguments,
+    loaded: &Loaded,
+    body: &Body,
+    found: &Drape,
+    report: &Report<'_>,
+) -> Result<Output, Failure> {
+    let (garment, mesh) = (&loaded.garment, &loaded.garment.mesh);
+    let title = format!("{} on {}", garment.name, body.name);
+    let placed = garment.drape.clone().unwrap_or_else(|| garment.placed());
+    let shown = |caption, x| Shown {
+        caption,
+        body: &body.mesh,
+        x,
+        aim: None,
+    };
+    let mut output = Output::new(&arguments.out);
+    output.add(
+        "garment.obj",
+        garment_obj::write(garment, &mesh.x_bar, &found.x, body.frame),
+    );
+    output.add(
+        "pattern.svg",
+        svg::pattern_svg(&garment.pattern, &garment.pattern, &garment.name),
+    );
+    let drapes = [shown("as it came", &placed[..]), shown("draped", &found.x)];
+    let views = [View::Front, View::Back, View::ThreeQuarter];
+    output.add("preview.png", contact_sheet(&title, mesh, &drapes, &views));
+    let panels = garment.pattern.panels.iter();
+    let names: Vec<&str> = panels.map(|panel| panel.name.as_str()).collect();
+    output.add("mesh.png", pattern_png(mesh, &mesh.x_bar, &names));
+    output.add("report.json", json(report)?);
+    Ok(output)
+}

@@ -1,0 +1,193 @@
+//! `dress refit`.
+
+use crate::arguments::RefitArguments;
+use crate::failure::Failure;
+use crate::inputs::{AVERAGE, Gathering, HEAVY, Input, InputReport, TSHIRT};
+use crate::params::Params;
+use crate::picture::View;
+use crate::progress::{Progress, stop_on_ctrl_c};
+use crate::show::{Shown, contact_sheet};
+use crate::summary;
+use anyhow::Context;
+use dress_anyone::body::Body;
+use dress_anyone::garment::Garment;
+use dress_anyone::geometry::{TriangleMesh, Vec3};
+use dress_anyone::io::garment::Loaded;
+use dress_anyone::io::output::{Output, check_writable};
+use dress_anyone::io::{body, garment_obj, garmentcode, obj, svg};
+use dress_anyone::problem::BadInput;
+use dress_anyone::refit::{Refit, RefitError, refit};
+use dress_anyone::report::Report;
+use dress_anyone::transfer::TransferError;
+use serde::Serialize;
+use std::path::Path;
+use std::sync::atomic::Ordering;
+
+/// Everything read.
+struct Inputs<'a> {
+    names: [Input<'a>; 3],
+    params: Params,
+    loaded: Loaded,
+    source: Body,
+    target: Body,
+}
+
+/// Refits; what to say about it in the end.
+pub fn run(arguments: &RefitArguments) -> Result<String, Failure> {
+    let inputs = read(arguments)?;
+    let stop = stop_on_ctrl_c().context("Ctrl-C cannot be listened to")?;
+    let mut progress = Progress::new(arguments.running.quiet);
+    progress.notes(&inputs.loaded.garment.name, &inputs.loaded.notes);
+    progress.notes(&inputs.source.name, &inputs.source.notes);
+    progress.notes(&inputs.target.name, &inputs.target.notes);
+    let refitted = refit(
+        &inputs.loaded.garment,
+        &inputs.source,
+        &inputs.target,
+        &inputs.params.refit,
+        &mut |event| {
+            progress.event(event);
+            !stop.load(Ordering::SeqCst)
+        },
+    );
+    progress.close();
+    let refitted = refitted.map_err(|error| match error {
+        RefitError::Garment(problems) => {
+            BadInput::new(Path::new(&inputs.names[0].name()), problems).into()
+        }
+        other => Failure::from(other),
+    })?;
+    results(arguments, &inputs, &refitted)?.write()?;
+    if arguments.running.quiet {
+        return Ok(String::new());
+    }
+    Ok(summary::of(&refitted.report, &arguments.out))
+}
+
+/// Reads all inputs before complaining of any.
+fn read(arguments: &RefitArguments) -> Result<Inputs<'_>, Failure> {
+    let names = [
+        Input::or(arguments.garment.as_ref(), TSHIRT),
+        Input::or(arguments.source_body.as_ref(), AVERAGE),
+        Input::or(arguments.target_body.as_ref(), HEAVY),
+    ];
+    let mut gathering = Gathering::default();
+    let params = gathering.take(arguments.params());
+    let options = arguments
+        .reading
+        .garment(params.as_ref().unwrap_or(&Params::default()));
+    let loaded = gathering.take(names[0].garment(&options));
+    let [source, target] =
+        [names[1], names[2]].map(|name| gathering.take(name.body(&arguments.reading.body())));
+    gathering.take(check_writable(&arguments.out));
+    gathering.finish()?;
+    let all = params.zip(loaded).zip(source.zip(target));
+    let ((params, loaded), (source, target)) = all.expect("nothing was wrong with any of them");
+    if !source.shares_topology(&target) {
+        // The transfer would say so too, but only after the first drape.
+        let [source_body, target_body] = [source.name, target.name];
+        return Err(RefitError::from(TransferError::DifferentTopology {
+            source_body,
+            target_body,
+        })
+        .into());
+    }
+    Ok(Inputs {
+        names,
+        params,
+        loaded,
+        source,
+        target,
+    })
+}
+
+/// All files of a refit, in the unit and axes of the target body's.
+fn results(
+    arguments: &RefitArguments,
+    inputs: &Inputs<'_>,
+    refitted: &Refit,
+) -> Result<Output, Failure> {
+    let frame = inputs.target.frame;
+    let before = &inputs.loaded.garment;
+    let mut after = Garment {
+        pattern: refitted.pattern.clone(),
+        ..before.clone()
+    };
+    after.mesh.x_bar.clone_from(&refitted.x_bar);
+    let triangles = before.mesh.outward_triangles();
+    let shape = |title: &str, x: &[Vec3]| {
+        let mesh = TriangleMesh {
+            positions: x.to_vec(),
+            triangles: triangles.clone(),
+        };
+        obj::mesh_text(&format!("{title} {}", before.name), &mesh, frame)
+    };
+    let specification = inputs.loaded.specification.as_ref();
+    let pattern = garmentcode::write(&after.pattern, specification);
+    let garment = garment_obj::write(&after, &refitted.x_bar, &refitted.x, frame);
+    let title = format!("{}, refitted to {}", before.name, inputs.target.name);
+
+    let mut output = Output::new(&arguments.out);
+    output.add("pattern.json", json(&pattern)?);
+    output.add("garment.obj", garment);
+    output.add("target.obj", shape("target shape of", &refitted.x_star));
+    output.add("initial.obj", shape("initial guess of", &refitted.initial));
+    output.add("body.obj", body::write(&inputs.target));
+    output.add(
+        "pattern.svg",
+        svg::pattern_svg(&before.pattern, &after.pattern, &title),
+    );
+    output.add("preview.png", picture(&title, inputs, refitted));
+    output.add("report.json", json(&full_report(inputs, &refitted.report))?);
+    Ok(output)
+}
+
+/// Pretty JSON with a line end.
+pub fn json(value: &impl Serialize) -> anyhow::Result<String> {
+    let text = serde_json::to_string_pretty(value).context("a result cannot be told as JSON")?;
+    Ok(text + "\n")
+}
+
+fn picture(title: &str, inputs: &Inputs<'_>, refitted: &Refit) -> Vec<u8> {
+    let [source, target] = [&inputs.source.mesh, &inputs.target.mesh];
+    let aim = Some(refitted.x_star.as_slice());
+    let shown = |caption, body, x, aim| Shown {
+        caption,
+        body,
+        x,
+        aim,
+    };
+    contact_sheet(
+        title,
+        &inputs.loaded.garment.mesh,
+        &[
+            shown("on the source body", source, &refitted.source_drape, None),
+            shown("target shape", target, &refitted.x_star, None),
+            shown("initial guess", target, &refitted.initial, aim),
+            shown("refitted", target, &refitted.x, aim),
+        ],
+        &[View::Front, View::Back],
+    )
+}
+
+/// The report with what led to it.
+#[derive(Serialize)]
+struct FullReport<'a> {
+    garment: InputReport,
+    source_body: InputReport,
+    target_body: InputReport,
+    parameters: &'a Params,
+    #[serde(flatten)]
+    report: &'a Report,
+}
+
+fn full_report<'a>(inputs: &'a Inputs<'_>, report: &'a Report) -> FullReport<'a> {
+    let [garment, source, target] = inputs.names;
+    FullReport {
+        garment: InputReport::of_garment(garment, &inputs.loaded),
+        source_body: InputReport::of_body(source, &inputs.source),
+        target_body: InputReport::of_body(target, &inputs.target),
+        parameters: &inputs.params,
+        report,
+    }
+}

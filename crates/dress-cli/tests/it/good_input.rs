@@ -1,0 +1,134 @@
+//! What the program makes of good inputs.
+
+use crate::fixtures::Workplace;
+use serde_json::Value;
+use std::path::Path;
+
+fn shipped(name: &str) -> String {
+    let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../data");
+    data.join(name).to_str().unwrap().to_owned()
+}
+
+fn report(place: &Workplace) -> Value {
+    let text = std::fs::read(place.path("out/report.json")).unwrap();
+    serde_json::from_slice(&text).unwrap()
+}
+
+#[test]
+fn printed_parameters_are_the_defaults_when_read_back() {
+    let place = Workplace::new();
+    let printed = place.dress(&["params"]);
+    assert_eq!(printed.code, 0);
+    place.file("printed.toml", &printed.stdout);
+    for (folder, more) in [
+        ("with", &["--params", "printed.toml"][..]),
+        ("without", &[]),
+    ] {
+        let line = ["drape", "--garment", "tee.json", "--body", "body.obj"];
+        let coarse = ["--resolution", "35", "--quiet", "--out", folder];
+        let ran = place.dress(&[&line, &coarse, more].concat());
+        assert_eq!(ran.code, 0, "{}", ran.stderr);
+        assert_eq!((ran.stdout, ran.stderr), (String::new(), String::new()));
+    }
+    let parameters = |folder: &str| -> Value {
+        let text = std::fs::read(place.path(folder).join("report.json")).unwrap();
+        serde_json::from_slice::<Value>(&text).unwrap()["parameters"].take()
+    };
+    assert!(parameters("with").is_object());
+    assert_eq!(parameters("with"), parameters("without"));
+}
+
+#[test]
+fn a_cloth_laid_on_a_box_is_draped_and_told_of() {
+    let place = Workplace::new();
+    let line = [
+        "drape",
+        "--garment",
+        "tee.json",
+        "--body",
+        "body.obj",
+        "--out",
+        "out",
+    ];
+    let ran = place.dress(&[&line[..], &["--resolution", "35", "--threads", "1"]].concat());
+    assert_eq!(ran.code, 0, "{}", ran.stderr);
+    assert!(ran.stdout.contains("at rest"), "{}", ran.stdout);
+    let report = report(&place);
+    assert_eq!(report["status"], "at-rest");
+    assert_eq!(report["garment"]["unit"], "cm");
+    assert_eq!(report["body"]["unit"], "m");
+    for name in ["garment.obj", "pattern.svg", "preview.png", "mesh.png"] {
+        assert!(place.path("out").join(name).is_file(), "{name}");
+    }
+    // What was written is a garment again.
+    let ran = place.dress(&["inspect", "out/garment.obj"]);
+    assert_eq!(ran.code, 0, "{}", ran.stderr);
+    assert!(
+        ran.stdout.contains("2 panels, 1 stitches"),
+        "{}",
+        ran.stdout
+    );
+}
+
+#[test]
+fn a_pattern_is_told_by_panels_seams_and_free_edges() {
+    let ran = Workplace::new().dress(&["inspect", &shipped("garments/tshirt.json")]);
+    assert_eq!(ran.code, 0, "{}", ran.stderr);
+    for words in [
+        "tshirt: a garment",
+        "6 panels",
+        "left_sleeve_f",
+        "front:2 - back:6",
+        "free edges",
+        "itself",
+        "it has to rest on shoulders",
+    ] {
+        assert!(
+            ran.stdout.contains(words),
+            "`{words}` is not in: {}",
+            ran.stdout
+        );
+    }
+}
+
+#[test]
+fn a_body_is_told_by_size_unit_and_axis() {
+    let ran = Workplace::new().dress(&["inspect", &shipped("bodies/f_average.obj")]);
+    assert_eq!(ran.code, 0, "{}", ran.stderr);
+    // As data/README.md has it.
+    for words in ["a body", "12996 triangles", "1.69", "unit m, y up"] {
+        assert!(
+            ran.stdout.contains(words),
+            "`{words}` is not in: {}",
+            ran.stdout
+        );
+    }
+}
+
+/// Minutes: `cargo test --release -p dress-cli -- --ignored`.
+#[test]
+#[ignore = "takes minutes"]
+fn the_built_in_refit_writes_everything() {
+    let place = Workplace::new();
+    let ran = place.dress(&["refit", "--resolution", "35", "--out", "out"]);
+    assert_eq!(ran.code, 0, "{}", ran.stderr);
+    for name in [
+        "pattern.json",
+        "garment.obj",
+        "target.obj",
+        "initial.obj",
+        "body.obj",
+        "pattern.svg",
+        "preview.png",
+    ] {
+        assert!(place.path("out").join(name).is_file(), "{name}");
+    }
+    let report = report(&place);
+    let loss = |i: usize| report["iterations"][i]["shape_matching"].as_f64().unwrap();
+    let last = report["iterations"].as_array().unwrap().len() - 1;
+    assert!(loss(last) < loss(0), "{} -> {}", loss(0), loss(last));
+    for file in ["out/pattern.json", "out/garment.obj"] {
+        let ran = place.dress(&["inspect", file]);
+        assert_eq!(ran.code, 0, "{}", ran.stderr);
+    }
+}
