@@ -8,9 +8,6 @@
 
 mod control;
 pub mod enclose;
-#[cfg(test)]
-#[allow(clippy::unwrap_used)]
-pub(crate) mod fixture;
 pub mod green;
 #[cfg(test)]
 #[allow(clippy::unwrap_used)]

@@ -36,6 +36,9 @@
 
 #[cfg(test)]
 mod check;
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod fixtures;
 
 pub mod body;
 pub mod cage;

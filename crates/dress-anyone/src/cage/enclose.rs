@@ -307,8 +307,8 @@ fn unfold(half: &[Vec2]) -> Vec<Vec2> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cage::fixture;
     use crate::cage::green::coordinates;
+    use crate::fixtures;
     use crate::geometry::plane::complex;
     use proptest::prelude::*;
 
@@ -455,7 +455,7 @@ mod tests {
 
     #[test]
     fn every_panel_of_the_garmentcode_designs_is_held() {
-        for (name, pattern) in fixture::patterns() {
+        for (name, pattern) in fixtures::patterns() {
             for panel in &pattern.panels {
                 let outline = panel.outline(0.005);
                 assert_holds(&outline, 12, &format!("{name} {}", panel.name));

@@ -1,8 +1,8 @@
 //! What the cages of a whole pattern promise.
 
-use super::fixture::{panel, patterns, sampled};
 use super::*;
 use crate::check::noise;
+use crate::fixtures::{panel, patterns, sampled};
 use crate::geometry::Vec3;
 use crate::geometry::plane::{contains, is_simple};
 use nalgebra::{DMatrix, DVector};

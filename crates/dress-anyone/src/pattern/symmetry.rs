@@ -220,7 +220,7 @@ impl Seams {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cage::fixture::{panel, patterns, sampled};
+    use crate::fixtures::{panel, patterns, sampled};
     use crate::pattern::{EdgeId, Panel, Stitch};
     use approx::assert_relative_eq;
 

@@ -7,9 +7,13 @@
 
 use crate::geometry::Vec3;
 use faer::dyn_stack::{MemBuffer, MemStack};
-use faer::sparse::linalg::cholesky::{LltRef, SymbolicCholesky, factorize_symbolic_cholesky};
+use faer::linalg::cholesky::llt::factor::LltRegularization;
+use faer::sparse::linalg::cholesky::{
+    CholeskySymbolicParams, LltRef, SymbolicCholesky, SymmetricOrdering,
+    factorize_symbolic_cholesky,
+};
 use faer::sparse::{SparseColMat, Triplet};
-use faer::{Conj, Mat, Par, Side};
+use faer::{Conj, Mat, Par, Side, Spec};
 use std::collections::BTreeSet;
 
 /// The factored system of a source drape.
@@ -29,22 +33,22 @@ impl Relaxation {
         let symbolic = factorize_symbolic_cholesky(
             system.symbolic(),
             Side::Lower,
-            Default::default(),
-            Default::default(),
+            SymmetricOrdering::default(),
+            CholeskySymbolicParams::default(),
         )
         .expect("a garment's system fits in memory");
         let mut factor = vec![0.0; symbolic.len_val()];
-        let scratch = symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, Default::default());
+        let scratch = symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, Spec::default());
         symbolic
             .factorize_numeric_llt(
                 &mut factor,
                 system.as_ref(),
                 Side::Lower,
-                Default::default(),
+                LltRegularization::default(),
                 // One thread: its count must not change a bit of the result.
                 Par::Seq,
                 MemStack::new(&mut MemBuffer::new(scratch)),
-                Default::default(),
+                Spec::default(),
             )
             .expect("projectors plus a positive diagonal are positive definite");
         Self {

@@ -1,5 +1,5 @@
-//! Test-only: the GarmentCode designs of the shared data, read just well enough to draw cages
-//! around, and meshes without triangles.
+//! Patterns for tests: the GarmentCode designs of the shared data, read just well enough to draw
+//! cages around, panels made by hand, and meshes without triangles. Test-only.
 
 use crate::geometry::{Mat3, Vec2, Vec3};
 use crate::pattern::{Curve, Edge, EdgeId, Panel, Pattern, PatternMesh, Placement, Stitch};
