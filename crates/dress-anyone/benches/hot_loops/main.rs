@@ -15,14 +15,16 @@
 //! | `closest_point` | 60 a triangle visited, 30 a box | 72 and 48; what is visited depends on the point |
 //! | `distance_field` | 900 a sample | 512 a sample, in 16 rows of 32 |
 //! | `cages` | 150 a vertex and control point, a logarithm included | 16 a vertex and control point |
-//! | `differentiable` | `stiffness` and `factor`, more than once if indefinite | the same |
 //! | `pull_back` | 4 a non-zero of L, 300 a triangle, 150 a hinge | 16 a non-zero of L |
+//!
+//! Preparing a drape for its derivatives is `stiffness` and `factor` once, or more often where the
+//! stiffness is indefinite.
 
 mod summary;
 mod tube;
 mod yardstick;
 
-use criterion::{BatchSize, Criterion, SamplingMode};
+use criterion::{Criterion, SamplingMode};
 use dress_anyone::body::DistanceField;
 use dress_anyone::cage::{CageParams, Cages};
 use dress_anyone::geometry::ClosestPoint;
@@ -140,15 +142,7 @@ fn of_size(criterion: &mut Criterion, size: usize) -> Vec<summary::Row> {
         b.iter(|| Cages::enclose(&tube.pattern, &tube.mesh, None, &CageParams::default()));
     });
 
-    group.bench_function("differentiable", |b| {
-        b.iter_batched(
-            || found.clone(),
-            |drape| drape.differentiable(&scene),
-            BatchSize::LargeInput,
-        );
-    });
     let state = found
-        .clone()
         .differentiable(&scene)
         .expect("a shift makes any stiffness definite");
     group.bench_function("pull_back", |b| b.iter(|| state.pull_back(&at_rest)));
@@ -168,7 +162,6 @@ fn of_size(criterion: &mut Criterion, size: usize) -> Vec<summary::Row> {
         ("closest_point", vertices, "point"),
         ("distance_field", vertices, "point"),
         ("cages", x_bar.len(), "vertex"),
-        ("differentiable", vertices, "vertex"),
         ("pull_back", vertices, "vertex"),
     ];
     rows.into_iter().map(row).collect()
