@@ -2,8 +2,8 @@
 //! O'Malley 2020). Geometry only: not physical, no pattern.
 //!
 //! 1. Carry every cloth vertex from the space around the source body to that around the target
-//!    ([`bind`]).
-//! 2. Repeat: give it back its distance to the body, and relax ([`relax`]), which keeps the garment's
+//!    (`bind`).
+//! 2. Repeat: give it back its distance to the body, and relax (`relax`), which keeps the garment's
 //!    layout and folds through affine-invariant stencils.
 //! 3. Push out what still touches the body.
 //!
