@@ -37,7 +37,6 @@
 #[cfg(test)]
 mod check;
 #[cfg(test)]
-#[allow(clippy::unwrap_used)]
 mod fixture;
 
 pub mod body;

@@ -112,8 +112,21 @@ fn complex(p: Vec2) -> Complex64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::fixtures::panel;
+    use crate::geometry::Vec3;
     use crate::loss::fixtures;
+    use crate::pattern::{Pattern, triangulate};
     use approx::assert_relative_eq;
+
+    /// A panel of 1 m by `width` \[m\], meshed at that width.
+    fn strip(width: f64) -> PatternMesh {
+        let corners = [(0.0, 0.0), (width, 0.0), (width, 1.0), (0.0, 1.0)];
+        let pattern = Pattern {
+            panels: vec![panel("strip", &corners, Vec3::zeros())],
+            stitches: Vec::new(),
+        };
+        triangulate::mesh(&pattern, width).expect("a rectangle can be meshed")
+    }
 
     fn sum(rows: &[Row]) -> f64 {
         rows.iter().map(|r| r.value * r.value).sum()
@@ -151,9 +164,10 @@ mod tests {
 
     #[test]
     fn bending_a_straight_strip_costs_its_squared_curvature_at_any_resolution() {
-        // The side x = 0 of a sheet bent to radius 2 m: Δκ = ½ on every long edge.
+        // The side x = 0 of a strip bent to radius 2 m: Δκ = ½ on every long edge.
         let cost = |rows: usize| {
-            let mesh = crate::sim::cloth::fixtures::sheet(1, rows, 1.0 / rows as f64);
+            let width = 1.0 / rows as f64;
+            let mesh = strip(width);
             let bent: Vec<Vec2> = mesh
                 .x_bar
                 .iter()
@@ -162,7 +176,6 @@ mod tests {
                     Vec2::new(radius * angle.cos(), radius * angle.sin())
                 })
                 .collect();
-            let width = 1.0 / rows as f64;
             sum(&Curvature::new(&mesh).rows(&bent)) / (2.0 + 2.0 * width)
         };
         // Two sides of 1 m: 2 · (½)². The mesh narrows as it is refined, so the rest is its error.

@@ -208,6 +208,6 @@ mod tests {
         let far = Vec3::new(2.0, 0.0, 0.0);
         assert_eq!(energy(&ball, 1.0, 0.1, far), 0.0);
         assert_eq!(force(&ball, 1.0, 0.1, far), Vec3::zeros());
-        assert!(stiffness(&ball, 1.0, 0.1, far, false).is_none());
+        assert!(stiffness(&ball, 1.0, 0.1, far, 1.0).is_none());
     }
 }

@@ -1,0 +1,168 @@
+//! The loops a refit spends its time in, on a tube of two panels around an elliptic cylinder, at
+//! three sizes: `cargo bench -p dress-anyone`.
+//!
+//! Every time is also given as a multiple of a yardstick measured in the same run, one coloured
+//! sweep of distance constraints over 20,000 triangles ([`yardstick`]), so that runs on different
+//! or busy machines can be compared. Work and traffic of each loop, counted in its source, with
+//! indices and positions that come from the cache included in the bytes:
+//!
+//! | loop | flops | bytes |
+//! |---|---|---|
+//! | yardstick | 75 and 3 roots a triangle | 160 a triangle |
+//! | `sweep` | 500 a triangle: 400 for its membrane, 70 for each of its 1.5 hinges | 270 and 1.5 × 330 |
+//! | `stiffness` | 900 a triangle, 40 a hinge | 9 blocks of 72 a triangle, written |
+//! | `factor` | Σ l² over the columns of L, l their lengths; about n^1.5 | 8 a non-zero of L, at least |
+//! | `closest_point` | 60 a triangle visited, 30 a box | 72 and 48; what is visited depends on the point |
+//! | `distance_field` | 900 a sample | 512 a sample, in 16 rows of 32 |
+//! | `cages` | 150 a vertex and control point, a logarithm included | 16 a vertex and control point |
+//! | `pull_back` | 4 a non-zero of L, 300 a triangle, 150 a hinge | 16 a non-zero of L |
+//!
+//! Preparing a drape for its derivatives is `stiffness` and `factor` once, or more often where the
+//! stiffness is indefinite.
+
+mod summary;
+mod tube;
+mod yardstick;
+
+use criterion::{Criterion, SamplingMode};
+use dress_anyone::body::DistanceField;
+use dress_anyone::cage::{CageParams, Cages};
+use dress_anyone::geometry::ClosestPoint;
+use dress_anyone::sim::equilibrium::EquilibriumParams;
+use dress_anyone::sim::step::{State, StepParams, Stepper};
+use dress_anyone::sim::system::System;
+use dress_anyone::sim::{Assembly, Scene, SimParams, Start, drape};
+use std::hint::black_box;
+use std::path::Path;
+use std::time::Duration;
+use tube::Tube;
+
+/// Cloth vertices aimed for.
+const SIZES: [usize; 3] = [1_000, 4_000, 16_000];
+/// Force residual at which the tube's drape ends [–].
+const NEARLY_AT_REST: f64 = 1e-3;
+
+fn main() {
+    let results = Path::new(env!("CARGO_TARGET_TMPDIR")).join("hot_loops");
+    let mut criterion = Criterion::default()
+        .output_directory(&results)
+        .sample_size(10)
+        .warm_up_time(Duration::from_millis(200))
+        .measurement_time(Duration::from_secs(1))
+        .configure_from_args();
+    let mut grid = yardstick::Grid::new();
+    criterion.bench_function(summary::YARDSTICK, |b| b.iter(|| grid.sweep()));
+    let mut rows = Vec::new();
+    for size in SIZES {
+        rows.extend(of_size(&mut criterion, size));
+    }
+    criterion.final_summary();
+    summary::print(&results, &rows);
+}
+
+/// Measures every loop on a tube of about `size` vertices; what the summary should show.
+fn of_size(criterion: &mut Criterion, size: usize) -> Vec<summary::Row> {
+    let tube = Tube::new(size);
+    let body = tube::body();
+    let surface = DistanceField::new(&body, DistanceField::SPACING, DistanceField::OUTER);
+    let closest = ClosestPoint::new(&body);
+    let cloth = tube.cloth();
+    let params = SimParams {
+        // What is measured takes as long at a tube that is only nearly at rest.
+        equilibrium: EquilibriumParams {
+            tolerance: NEARLY_AT_REST,
+            polished: NEARLY_AT_REST,
+            ..EquilibriumParams::default()
+        },
+        ..SimParams::default()
+    };
+    let assembly = Assembly::new(&cloth);
+    let scene = Scene {
+        cloth: &cloth,
+        assembly: &assembly,
+        surface: &surface,
+        params: &params,
+    };
+    let x_bar = &tube.mesh.x_bar;
+    let rest = cloth.at_rest(x_bar);
+    let found = drape(&scene, x_bar, tube.x.clone(), Start::Near, &mut |_| true);
+    let at_rest = found.x.clone();
+    let vertices = cloth.vertex_count;
+    println!(
+        "\n{vertices} cloth vertices: {:?} after {} factorisations of {} non-zeros",
+        found.status,
+        found.iterations,
+        assembly.structure().factor_size(),
+    );
+
+    let name = format!("{size}");
+    let mut group = criterion.benchmark_group(&name);
+    group.sampling_mode(SamplingMode::Flat);
+
+    let one_sweep = StepParams {
+        sweeps: 1,
+        ..params.step
+    };
+    let mut stepper = Stepper::new(&cloth, &rest, &surface, params.contact, one_sweep);
+    let mut state = State {
+        x: at_rest.clone(),
+        v: vec![nalgebra::zero(); vertices],
+    };
+    group.bench_function("sweep", |b| b.iter(|| stepper.step(&mut state)));
+
+    let system = System {
+        cloth: &cloth,
+        assembly: &assembly,
+        rest: &rest,
+        surface: &surface,
+        contact: params.contact,
+    };
+    group.bench_function("stiffness", |b| {
+        b.iter(|| system.stiffness(&at_rest, false));
+    });
+    let stiffness = system.stiffness(&at_rest, true);
+    group.bench_function("factor", |b| b.iter(|| stiffness.factor()));
+
+    group.bench_function("closest_point", |b| {
+        b.iter(|| {
+            at_rest
+                .iter()
+                .map(|p| closest.signed_distance(*p))
+                .sum::<f64>()
+        });
+    });
+    group.bench_function("distance_field", |b| {
+        b.iter(|| {
+            for p in &at_rest {
+                black_box(surface.sample_with_hessian(*p));
+            }
+        });
+    });
+    group.bench_function("cages", |b| {
+        b.iter(|| Cages::enclose(&tube.pattern, &tube.mesh, None, &CageParams::default()));
+    });
+
+    let state = found
+        .differentiable(&scene)
+        .expect("a shift makes any stiffness definite");
+    group.bench_function("pull_back", |b| b.iter(|| state.pull_back(&at_rest)));
+    group.finish();
+
+    let row = |(loop_name, items, unit)| summary::Row {
+        group: name.clone(),
+        loop_name,
+        items,
+        unit,
+    };
+    let triangles = cloth.triangles.len();
+    let rows = [
+        ("sweep", triangles, "triangle"),
+        ("stiffness", triangles, "triangle"),
+        ("factor", vertices, "vertex"),
+        ("closest_point", vertices, "point"),
+        ("distance_field", vertices, "point"),
+        ("cages", x_bar.len(), "vertex"),
+        ("pull_back", vertices, "vertex"),
+    ];
+    rows.into_iter().map(row).collect()
+}

@@ -1,0 +1,3 @@
+//! Integration tests, one binary: what no module can see of itself.
+
+mod architecture;
