@@ -7,7 +7,7 @@
 //! Λ Σ |r|²/h³ tends to Λ ∫ (Δκ)² ds; at a corner |r|²/h² is the squared change of its angle.
 
 use super::Row;
-use crate::geometry::Vec2;
+use crate::geometry::{Vec2, complex};
 use crate::pattern::PatternMesh;
 use num_complex::Complex64;
 
@@ -105,24 +105,19 @@ impl Stencil {
     }
 }
 
-fn complex(p: Vec2) -> Complex64 {
-    Complex64::new(p.x, p.y)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fixtures::panel;
-    use crate::geometry::Vec3;
+    use crate::fixture::panel;
     use crate::loss::fixtures;
     use crate::pattern::{Pattern, triangulate};
     use approx::assert_relative_eq;
 
     /// A panel of 1 m by `width` \[m\], meshed at that width.
     fn strip(width: f64) -> PatternMesh {
-        let corners = [(0.0, 0.0), (width, 0.0), (width, 1.0), (0.0, 1.0)];
+        let corners = [[0.0, 0.0], [width, 0.0], [width, 1.0], [0.0, 1.0]];
         let pattern = Pattern {
-            panels: vec![panel("strip", &corners, Vec3::zeros())],
+            panels: vec![panel("strip", &corners)],
             stitches: Vec::new(),
         };
         triangulate::mesh(&pattern, width).expect("a rectangle can be meshed")

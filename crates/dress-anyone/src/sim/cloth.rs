@@ -194,8 +194,8 @@ pub(crate) mod fixtures {
         }
         let count = x_bar.len();
         PatternMesh {
-            panel_vertices: vec![0..count],
-            panel_triangles: vec![0..triangles.len()],
+            panel_vertices: std::iter::once(0..count).collect(),
+            panel_triangles: std::iter::once(0..triangles.len()).collect(),
             right_side_up: vec![true],
             edge_vertices: vec![vec![
                 (0..=columns).map(|i| at(i, 0)).collect(),
@@ -251,7 +251,7 @@ mod tests {
         let (columns, rows) = (8, 3);
         let cloth = Cloth::new(&fixtures::tube(columns, rows, 0.1), &Fabric::default());
         // 3F = 2E + B over all edges, B the two rims.
-        let edges = (3 * cloth.triangles.len() + 2 * columns) / 2;
+        let edges = usize::midpoint(3 * cloth.triangles.len(), 2 * columns);
         assert_eq!(cloth.hinges.len(), edges - 2 * columns);
     }
 

@@ -77,6 +77,8 @@ pub struct Equilibrium {
 
 /// Residual above which compressive stress is left out: far from rest it only makes steps fail.
 const EXACT_BELOW: f64 = 3.0;
+/// Damping below which there might as well be none \[1/s²\].
+const LEAST_SIGMA: f64 = 1e-3;
 /// Below this part of the compressive stress none of it is tried.
 const LEAST_EXACTNESS: f64 = 0.1;
 /// Residual below which energy differences drown in round-off, and the residual itself must fall.
@@ -132,7 +134,6 @@ pub fn find<S: Surface>(
             }
             continue;
         };
-        let used = exactness;
         let mut direction = factor.solve(&force);
         let farthest = direction.iter().map(Vec3::norm).fold(0.0, f64::max);
         if !farthest.is_finite() {
@@ -151,27 +152,21 @@ pub fn find<S: Surface>(
             sigma = 10.0 * sigma.max(1.0);
             continue;
         };
-        if std::env::var("TRACE").is_ok() {
-            eprintln!(
-                "{iterations} r {residual:.3e} sigma {sigma:.2e} exact {used:.2} far {farthest:.4} frac {} E {:.8}",
-                step.fraction, step.energy
-            );
-        }
         x = step.x;
         force = step.force;
         residual = step.residual;
-        exactness = if residual < EXACT_BELOW {
-            (exactness + 0.25).min(1.0)
-        } else {
-            0.0
-        };
         energy = step.energy;
+        if residual >= EXACT_BELOW {
+            exactness = 0.0;
+        } else {
+            exactness = (exactness + 0.25).min(1.0);
+        }
         if step.fraction < 1.0 {
             sigma *= 2.0;
         } else if farthest < 10.0 * params.step {
             sigma *= 0.3;
-            if sigma < 1e-3 && residual < 1e-2 {
-                sigma = 0.0;
+            if sigma < LEAST_SIGMA {
+                sigma = if residual < 1e-2 { 0.0 } else { LEAST_SIGMA };
             }
         }
         centres.push(centre(&x));
