@@ -54,7 +54,7 @@ impl Default for LossParams {
             boundary: 1.0,
             seam: 1.0,
             interior: 0.05,
-            curvature: 0.3,
+            curvature: 0.05,
             seam_length: 300.0,
             whole_seam: 3000.0,
             area: 300.0,

@@ -72,7 +72,7 @@ pub fn drape_on(
     let surface = DistanceField::new(&body.mesh, DistanceField::SPACING, DistanceField::OUTER);
     let (x, start) = match &garment.drape {
         Some(x) => (x.clone(), Start::Near),
-        None => (garment.placed(), Start::Placed),
+        None => (on_the_floor(garment.placed(), body), Start::Placed),
     };
     let mut cloth = Cloth::new(&garment.mesh, fabric);
     cloth.holds = holds(garment, &x, hold);
@@ -83,4 +83,16 @@ pub fn drape_on(
         params: sim,
     };
     drape(&scene, &garment.mesh.x_bar, x, start, observe)
+}
+
+/// How far above the soles cloth starts at least \[m\].
+const OFF_THE_FLOOR: f64 = 5e-3;
+
+/// Lifts what is placed below the body's soles, where it would be caught under the feet.
+fn on_the_floor(mut x: Vec<Vec3>, body: &Body) -> Vec<Vec3> {
+    let floor = body.mesh.bounds().0.y + OFF_THE_FLOOR;
+    for p in &mut x {
+        p.y = p.y.max(floor);
+    }
+    x
 }

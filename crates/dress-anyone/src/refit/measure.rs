@@ -178,6 +178,9 @@ fn seams(before: &Pattern, after: &Pattern) -> Vec<SeamReport> {
         .collect()
 }
 
+/// Corners this near to each other's mirror image correspond \[m\].
+const SAME_CORNER: f64 = 1e-3;
+
 /// How far corners moved unlike their mirror images, per mirror pair.
 fn mirrors(before: &Pattern, after: &Pattern, symmetry: &Symmetry) -> Vec<MirrorReport> {
     let reports = symmetry.mirrors.iter().map(|mirror| {
@@ -190,16 +193,17 @@ fn mirrors(before: &Pattern, after: &Pattern, symmetry: &Symmetry) -> Vec<Mirror
                 .collect()
         };
         let (old, new) = (image(before), image(after));
-        let nearest = |p: &Vec2| {
-            let candidates = before.panels[b].vertices.iter().enumerate();
-            candidates
-                .min_by(|x, y| (x.1 - p).norm().total_cmp(&(y.1 - p).norm()))
-                .map_or(0, |(i, _)| i)
+        // Corners without a mirrored partner (an edge split on one side only) cannot be compared.
+        let partner = |p: &Vec2| {
+            let corners = before.panels[b].vertices.iter();
+            corners
+                .enumerate()
+                .find(|(_, q)| (*q - p).norm() < SAME_CORNER)
         };
-        let error = old.iter().zip(&new).map(|(o, n)| {
-            let partner = nearest(o);
-            let moved = after.panels[b].vertices[partner] - before.panels[b].vertices[partner];
-            ((n - o) - moved).norm()
+        let error = old.iter().zip(&new).filter_map(|(o, n)| {
+            let (i, q) = partner(o)?;
+            let moved = after.panels[b].vertices[i] - q;
+            Some(((n - o) - moved).norm())
         });
         MirrorReport {
             panels: [a, b].map(|p| after.panels[p].name.clone()),

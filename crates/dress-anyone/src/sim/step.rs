@@ -121,7 +121,7 @@ impl<'a, S: Surface> Stepper<'a, S> {
         self.lambda_membrane.fill(Vec3::zeros());
         self.lambda_bend.fill(Vec3::zeros());
         self.lambda_hold.fill(0.0);
-        let mut touching = self.touching(&state.x);
+        let mut touching = self.touching(&before);
         for _ in 0..self.params.sweeps {
             self.sweep_membrane(&mut state.x);
             self.sweep_bend(&mut state.x);
@@ -206,6 +206,8 @@ impl<'a, S: Surface> Stepper<'a, S> {
         }
     }
 
+    /// Contacts of the positions before the step: a vertex outside thin parts (toes, fingers) then
+    /// stays on its side of them.
     fn touching(&self, x: &[Vec3]) -> Vec<Touch> {
         let per_time = 1.0 / (self.params.dt * self.params.dt);
         let reach = self.contact.thickness + 2.0 * self.params.speed * self.params.dt;
