@@ -172,57 +172,95 @@ pub struct Differentiable<'a> {
 /// modes of a garment (a pendulum of 1 m has g/l ≈ 10).
 const FIRST_SHIFT: f64 = 1e-3;
 
+/// Kicks off saddles before the stiffness is shifted instead.
+const KICKS: usize = 3;
+/// Farthest any vertex moves in a kick \[m\].
+const KICK: f64 = 1e-3;
+
 impl Drape {
-    /// Polishes the state and factors its exact stiffness. A saddle, whose stiffness is indefinite,
-    /// is shifted just as far as needed, and says so.
+    /// Polishes the state and factors its exact stiffness. A state whose stiffness is indefinite is
+    /// a saddle: it is left along its softest mode, and settles anew. Where that does not help the
+    /// stiffness is shifted just as far as needed, and [`Differentiable::shift`] says so.
     pub fn differentiable<'a, S: Surface>(
-        self,
+        mut self,
         scene: &Scene<'a, S>,
     ) -> Option<Differentiable<'a>> {
         let params = &scene.params.equilibrium;
         let system = system(scene, &self.rest);
         let polish = EquilibriumParams {
-            iterations: 12,
+            iterations: 40,
             ..*params
         };
-        let found = equilibrium::find(
-            &system,
-            self.x,
-            0.0,
-            params.polished,
-            &polish,
-            &mut |_, _| true,
-        );
-        let mut shift = 0.0;
-        let factor = loop {
-            let mut k = system.stiffness(&found.x, 1.0);
-            k.add_diagonal(shift, &self.rest.mass);
-            if let Some(factor) = k.factor() {
-                break factor;
+        let mut sigma = 0.0;
+        let mut kicks = 0;
+        let (factor, shift) = loop {
+            let start = std::mem::take(&mut self.x);
+            let still = &mut |_, _| true;
+            let found = equilibrium::find(&system, start, sigma, params.polished, &polish, still);
+            self.iterations += found.iterations;
+            self.residual = found.residual;
+            self.x = found.x;
+            let (factor, shift) = shifted_factor(&system, &self.x)?;
+            if shift == 0.0 || kicks == KICKS {
+                break (factor, shift);
             }
-            shift = if shift == 0.0 {
-                FIRST_SHIFT
-            } else {
-                10.0 * shift
-            };
-            if !(shift < 1e9) {
-                return None;
+            kicks += 1;
+            sigma = shift;
+            let mode = softest_mode(&system, &factor);
+            for (x, d) in self.x.iter_mut().zip(mode) {
+                *x += d * KICK;
             }
         };
         Some(Differentiable {
             cloth: scene.cloth,
-            drape: Self {
-                x: found.x,
-                residual: found.residual,
-                iterations: self.iterations + found.iterations,
-                x_bar: self.x_bar,
-                status: self.status,
-                rest: self.rest,
-            },
+            drape: self,
             factor,
             shift,
         })
     }
+}
+
+/// Factor of K + σM with the smallest σ tried that makes it definite, and σ \[1/s²\].
+fn shifted_factor<S: Surface>(system: &System<'_, S>, x: &[Vec3]) -> Option<(Factor, f64)> {
+    let mut shift = 0.0;
+    loop {
+        let mut k = system.stiffness(x, 1.0);
+        k.add_diagonal(shift, &system.rest.mass);
+        if let Some(factor) = k.factor() {
+            return Some((factor, shift));
+        }
+        shift = if shift == 0.0 {
+            FIRST_SHIFT
+        } else {
+            10.0 * shift
+        };
+        if !(shift < 1e9) {
+            return None;
+        }
+    }
+}
+
+/// The mode to which the shifted stiffness gives way most, by inverse iteration from unstructured
+/// forces; its farthest vertex moves by 1.
+fn softest_mode<S: Surface>(system: &System<'_, S>, factor: &Factor) -> Vec<Vec3> {
+    let unstructured = |i: usize| ((i as f64 + 1.0).sin() * 43_758.545_3).fract();
+    let vertices = 0..system.cloth.vertex_count;
+    let mut mode: Vec<Vec3> = vertices
+        .map(|a| Vec3::from_fn(|c, _| unstructured(3 * a + c)))
+        .collect();
+    for _ in 0..8 {
+        let forces: Vec<Vec3> = mode
+            .iter()
+            .zip(&system.rest.mass)
+            .map(|(d, m)| d * *m)
+            .collect();
+        mode = factor.solve(&forces);
+        let farthest = mode.iter().map(Vec3::norm).fold(0.0, f64::max);
+        for d in &mut mode {
+            *d /= farthest;
+        }
+    }
+    mode
 }
 
 impl Differentiable<'_> {

@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 /// Modules that everybody may import.
 const FOR_ALL: [&str; 1] = ["problem"];
 /// Modules that exist for tests, and that all tests may import.
-const FOR_TESTS: [&str; 2] = ["check", "fixtures"];
+const FOR_TESTS: [&str; 2] = ["check", "fixture"];
 /// What the tests of a module may import beyond the list: (module, imported).
 const TEST_EXCEPTIONS: [(&str, &str); 2] = [("pattern", "io"), ("pattern", "garment")];
 
