@@ -17,15 +17,16 @@ from dataclasses import dataclass
 @dataclass
 class Body:
     bust: float = 86.8  # girth
-    hip: float = 98.7  # girth
+    hip: float = 93.0  # girth of the high hip, where the hem is
     biceps: float = 26.0  # girth of the upper arm
-    hip_height: float = 83.0
-    underarm: float = 43.5  # of the armpit, above the hip
-    neck: float = 7.3  # from the middle to the side of the neck
+    hip_height: float = 90.0
+    underarm: float = 36.0  # of the armpit, above the hip
+    neck: float = 8.0  # from the middle to the side of the neck
     shoulder: float = 17.5  # from the middle to the end of the shoulder
-    # From the hip over the trunk, as a taut cloth lies, to the shoulder seam's two ends.
-    front_lengths: tuple = (66.0, 60.3)
-    back_lengths: tuple = (63.3, 58.6)
+    # From the hip over the trunk, as a taut cloth lies, to the shoulder seam's two ends. The seam
+    # lies a little in front of the shoulders' ridge, which evens out front and back.
+    front_lengths: tuple = (57.0, 52.4)
+    back_lengths: tuple = (55.2, 51.0)
     front: float = 14.4  # z of the foremost point of the trunk
     back: float = -11.2  # z of the hindmost
     arm_front: float = 5.0
@@ -36,11 +37,13 @@ class Body:
 @dataclass
 class Design:
     bust_ease: float = 5.5
-    hip_ease: float = 4.0
+    hip_ease: float = 8.0  # half of it is for the cloth that hangs clear of the belly
     biceps_ease: float = 4.0
-    armhole_ease: float = 2.5  # the armhole's bottom below the armpit
-    neck_front: float = 8.0  # depth of the neckline below its side
-    neck_back: float = 2.4
+    armhole_ease: float = 2.0  # the armhole's bottom below the armpit
+    neck_front: float = 8.5  # depth of the neckline below its side
+    neck_back: float = 2.0
+    scoop_front: float = 5.5  # how far the armhole runs in at its bottom
+    scoop_back: float = 4.5
     cap_ease: float = 0.2  # the sleeve's cap over the armhole, in each half
     underarm_seam: float = 12.0
     sleeve_taper: float = 1.0  # each half narrows by this to its hem
@@ -157,7 +160,7 @@ class Torso:
         ]
         self.armhole = [
             (self.underarm[0] - scoop, underarm_y + 0.3),
-            (self.shoulder[0] + 0.52 * depth * down[0], self.shoulder[1] + 0.52 * depth * down[1]),
+            (self.shoulder[0] + 0.35 * depth * down[0], self.shoulder[1] + 0.35 * depth * down[1]),
         ]
         self.neckline = [
             (self.neck[0] + 0.55 * neck_depth * down[0], self.neck[1] + 0.55 * neck_depth * down[1]),
@@ -245,8 +248,8 @@ def stitches(loops):
 
 
 def draft(body, design):
-    front = Torso(body, design, body.front_lengths, design.neck_front, scoop=7.5)
-    back = Torso(body, design, body.back_lengths, design.neck_back, scoop=6.5)
+    front = Torso(body, design, body.front_lengths, design.neck_front, design.scoop_front)
+    back = Torso(body, design, body.back_lengths, design.neck_back, design.scoop_back)
     sleeve_front, sleeve_back = sleeve_halves(body, design, front, back)
     loops = {
         "front": front.sides(),
