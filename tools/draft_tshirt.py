@@ -17,12 +17,17 @@ from dataclasses import dataclass
 @dataclass
 class Body:
     bust: float = 86.8  # girth
-    hip: float = 98.7  # girth
+    hip: float = 93.0  # girth of the high hip, where the hem is
     biceps: float = 26.0  # girth of the upper arm
-    neck_side: tuple = (9.5, 142.4)  # where neckline and shoulder seam meet
-    shoulder: tuple = (18.5, 139.0)  # outer end of the shoulder seam
-    hip_height: float = 83.0
-    front: float = 14.3  # z of the foremost point of the trunk
+    hip_height: float = 90.0
+    underarm: float = 36.0  # of the armpit, above the hip
+    neck: float = 8.0  # from the middle to the side of the neck
+    shoulder: float = 17.5  # from the middle to the end of the shoulder
+    # From the hip over the trunk, as a taut cloth lies, to the shoulder seam's two ends. The seam
+    # lies a little in front of the shoulders' ridge, which evens out front and back.
+    front_lengths: tuple = (57.0, 52.4)
+    back_lengths: tuple = (55.2, 51.0)
+    front: float = 14.4  # z of the foremost point of the trunk
     back: float = -11.2  # z of the hindmost
     arm_front: float = 5.0
     arm_back: float = -3.8
@@ -31,15 +36,15 @@ class Body:
 
 @dataclass
 class Design:
-    bust_ease: float = 9.0
-    hip_ease: float = 6.0
-    biceps_ease: float = 7.0
-    lift: float = 1.3  # how far above the shoulders the flat panels wait
-    armhole_depth: float = 20.5  # below the shoulder's end, in height
-    front_balance: float = 1.0  # the front is longer above the underarm, for the bust
-    neck_front: float = 9.5  # depth of the neckline below its side
-    neck_back: float = 2.5
-    cap_ease: float = 0.5  # the sleeve's cap over the armhole, in each half
+    bust_ease: float = 5.5
+    hip_ease: float = 8.0  # half of it is for the cloth that hangs clear of the belly
+    biceps_ease: float = 4.0
+    armhole_ease: float = 2.0  # the armhole's bottom below the armpit
+    neck_front: float = 8.5  # depth of the neckline below its side
+    neck_back: float = 2.0
+    scoop_front: float = 5.5  # how far the armhole runs in at its bottom
+    scoop_back: float = 4.5
+    cap_ease: float = 0.2  # the sleeve's cap over the armhole, in each half
     underarm_seam: float = 12.0
     sleeve_taper: float = 1.0  # each half narrows by this to its hem
     clearance: float = 4.0  # between body and flat panels
@@ -127,17 +132,21 @@ def mirrored(sides):
     ]
 
 
+def shoulder_reach(body, lengths):
+    """How far the shoulder seam reaches sideways, so that front and back seams are as long."""
+    long = math.hypot(body.shoulder - body.neck, body.back_lengths[0] - body.back_lengths[1])
+    return math.sqrt(long**2 - (lengths[0] - lengths[1]) ** 2)
+
+
 class Torso:
     """Left half of the front or the back, from the middle of the hem up; mirrored for the whole."""
 
-    def __init__(self, body, design, balance, neck_depth, scoop):
-        rise = body.hip_height
-        underarm_y = body.shoulder[1] + design.lift - design.armhole_depth - rise
-        shift = (0.0, design.lift + balance - rise)
+    def __init__(self, body, design, lengths, neck_depth, scoop):
+        underarm_y = body.underarm - design.armhole_ease
         self.hem = ((body.hip + design.hip_ease) / 4, 0.0)
         self.underarm = ((body.bust + design.bust_ease) / 4, underarm_y)
-        self.shoulder = add(body.shoulder, shift)
-        self.neck = add(body.neck_side, shift)
+        self.neck = (body.neck, lengths[0])
+        self.shoulder = (body.neck + shoulder_reach(body, lengths), lengths[1])
         self.centre = (0.0, self.neck[1] - neck_depth)
         slope = sub(self.neck, self.shoulder)
         length = math.hypot(*slope)
@@ -151,7 +160,7 @@ class Torso:
         ]
         self.armhole = [
             (self.underarm[0] - scoop, underarm_y + 0.3),
-            (self.shoulder[0] + 0.52 * depth * down[0], self.shoulder[1] + 0.52 * depth * down[1]),
+            (self.shoulder[0] + 0.35 * depth * down[0], self.shoulder[1] + 0.35 * depth * down[1]),
         ]
         self.neckline = [
             (self.neck[0] + 0.55 * neck_depth * down[0], self.neck[1] + 0.55 * neck_depth * down[1]),
@@ -239,8 +248,8 @@ def stitches(loops):
 
 
 def draft(body, design):
-    front = Torso(body, design, design.front_balance, design.neck_front, scoop=7.5)
-    back = Torso(body, design, 0.0, design.neck_back, scoop=6.5)
+    front = Torso(body, design, body.front_lengths, design.neck_front, design.scoop_front)
+    back = Torso(body, design, body.back_lengths, design.neck_back, design.scoop_back)
     sleeve_front, sleeve_back = sleeve_halves(body, design, front, back)
     loops = {
         "front": front.sides(),
