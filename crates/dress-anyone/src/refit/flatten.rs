@@ -7,18 +7,21 @@
 //! seam terms of the loss), R anew in every round, as in as-rigid-as-possible mapping (Sorkine &
 //! Alexa 2007). No drape is needed. Not in the paper, whose initial guess is a uniform scale.
 
-use super::search::{slope, without};
+use super::search::{can_be_cut, quality_floor, slope, without};
 use crate::cage::Cages;
 use crate::descent::Model;
 use crate::geometry::{Mat2, Vec2, Vec3};
 use crate::loss::{Losses, Row};
 use crate::pattern::PatternMesh;
 use crate::sim::energy::membrane::RestTriangle;
+use nalgebra::DVector;
 
 /// Rounds of rotations and fits.
 const ROUNDS: usize = 12;
 /// Weight of the mean squared strain that remains: 1 % costs 0.1.
 const STRAIN: f64 = 1000.0;
+/// No triangle may fall below this part of the reference pattern's poorest; leaves the search room.
+const LEAST_QUALITY: f64 = 0.92;
 /// Damping of the fits, for what nothing determines.
 const DAMPING: f64 = 1e-4;
 
@@ -35,6 +38,7 @@ pub(super) fn flatten(
     let wanted: Vec<Wanted> = (0..mesh.triangles.len())
         .filter_map(|t| Wanted::new(mesh, t, drape, x_star))
         .collect();
+    let floor = quality_floor(mesh, LEAST_QUALITY);
     let area: f64 = wanted.iter().map(|w| w.rest.area).sum();
     for _ in 0..ROUNDS {
         let x_bar = cages.deform(&zeta);
@@ -55,13 +59,25 @@ pub(super) fn flatten(
             return zeta;
         };
         without(&mut step, &cages.rigid_modes(&zeta));
-        let next: Vec<f64> = zeta.iter().zip(step.iter()).map(|(z, d)| z + d).collect();
-        if cages.check(&next).is_err() {
+        let Some(next) = shortened(&zeta, step, |next| can_be_cut(cages, mesh, next, floor)) else {
             return zeta;
-        }
+        };
         zeta = next;
     }
     zeta
+}
+
+/// `zeta` moved by the longest of a few parts of `step` that is allowed.
+fn shortened(
+    zeta: &[f64],
+    step: DVector<f64>,
+    allowed: impl Fn(&[f64]) -> bool,
+) -> Option<Vec<f64>> {
+    [1.0, 0.5, 0.25, 0.1, 0.03].into_iter().find_map(|part| {
+        let moved = zeta.iter().zip(step.iter());
+        let next: Vec<f64> = moved.map(|(z, d)| z + part * d).collect();
+        allowed(&next).then_some(next)
+    })
 }
 
 /// What one triangle's rest shape should become.

@@ -20,11 +20,11 @@ use nalgebra::DVector;
 /// Predicted moves of the cloth beyond this are not trusted as a start \[m\].
 const FARTHEST_PREDICTION: f64 = 0.03;
 /// No triangle may fall below this part of the reference pattern's poorest.
-const LEAST_QUALITY: f64 = 0.85;
+const LEAST_QUALITY: f64 = 0.82;
 /// A refused step is tried again only while it moves the pattern farther than this \[m\].
 const SHORTEST_TRIAL: f64 = 1e-5;
 /// How often a settled search drapes its pattern again from the target shape.
-const FRESH_STARTS: usize = 2;
+const FRESH_STARTS: usize = 4;
 
 /// Everything the search needs and does not change.
 pub(super) struct Search<'a, S> {
@@ -89,7 +89,7 @@ impl<'s, S: Surface> Search<'s, S> {
                 self.note(&best, moved, &mut run);
             }
         }
-        let floor = LEAST_QUALITY * self.least_quality(&self.mesh.x_bar);
+        let floor = quality_floor(self.mesh, LEAST_QUALITY);
         let mut damping = Damping(self.params.damping);
         let mut slow = 0;
         let mut fresh_starts = 0;
@@ -270,17 +270,12 @@ impl<'s, S: Surface> Search<'s, S> {
             }
             if moved > self.params.step {
                 *step *= 0.999 * self.params.step / moved;
-            } else if self.cages.check(&zeta).is_ok() && self.least_quality(&x_bar) >= floor {
+            } else if can_be_cut(self.cages, self.mesh, &zeta, floor) {
                 return Some(zeta);
             } else {
                 *step *= 0.5;
             }
         }
-    }
-
-    fn least_quality(&self, x_bar: &[Vec2]) -> f64 {
-        let each = qualities(x_bar, &self.mesh.triangles);
-        each.into_iter().fold(f64::INFINITY, f64::min)
     }
 
     /// Where the drape goes to first order, if that is near enough to be believed.
@@ -342,6 +337,22 @@ enum Stepped<'a> {
     Better(Box<Point<'a>>),
     NoBetter,
     Interrupted,
+}
+
+/// Whether the rest shape at `zeta` can be cut: cages and outlines do not cross, and no triangle is
+/// flipped or poorer than `floor`.
+pub(super) fn can_be_cut(cages: &Cages, mesh: &PatternMesh, zeta: &[f64], floor: f64) -> bool {
+    cages.check(zeta).is_ok() && least_quality(mesh, &cages.deform(zeta)) >= floor
+}
+
+/// The part `of` of the quality of the reference pattern's poorest triangle.
+pub(super) fn quality_floor(mesh: &PatternMesh, of: f64) -> f64 {
+    of * least_quality(mesh, &mesh.x_bar)
+}
+
+fn least_quality(mesh: &PatternMesh, x_bar: &[Vec2]) -> f64 {
+    let each = qualities(x_bar, &mesh.triangles);
+    each.into_iter().fold(f64::INFINITY, f64::min)
 }
 
 /// Farthest any vertex is from its partner \[m\].
