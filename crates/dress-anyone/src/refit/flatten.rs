@@ -59,7 +59,8 @@ pub(super) fn flatten(
             return zeta;
         };
         without(&mut step, &cages.rigid_modes(&zeta));
-        let Some(next) = shortened(&zeta, step, |next| can_be_cut(cages, mesh, next, floor)) else {
+        let Some(next) = shortened(&zeta, &step, |next| can_be_cut(cages, mesh, next, floor))
+        else {
             return zeta;
         };
         zeta = next;
@@ -70,7 +71,7 @@ pub(super) fn flatten(
 /// `zeta` moved by the longest of a few parts of `step` that is allowed.
 fn shortened(
     zeta: &[f64],
-    step: DVector<f64>,
+    step: &DVector<f64>,
     allowed: impl Fn(&[f64]) -> bool,
 ) -> Option<Vec<f64>> {
     [1.0, 0.5, 0.25, 0.1, 0.03].into_iter().find_map(|part| {
