@@ -45,6 +45,7 @@ class Design:
     scoop_front: float = 5.5  # how far the armhole runs in at its bottom
     scoop_back: float = 4.5
     cap_ease: float = 0.2  # the sleeve's cap over the armhole, in each half
+    lift: float = -0.9  # the flat panels wait this much lower, clear of the armpits
     underarm_seam: float = 12.0
     sleeve_taper: float = 1.0  # each half narrows by this to its hem
     clearance: float = 4.0  # between body and flat panels
@@ -259,7 +260,7 @@ def draft(body, design):
     }
     for half in "fb":
         loops[f"right_sleeve_{half}"] = mirrored(loops[f"left_sleeve_{half}"])
-    rise, gap, angle = body.hip_height, design.clearance, body.arm_angle
+    rise, gap, angle = body.hip_height + design.lift, design.clearance, body.arm_angle
     # Both halves hang from the same line over the arm.
     x, y = placed_sleeve(sleeve_front, front, rise, angle)
     places = {
