@@ -36,9 +36,9 @@ class Body:
 
 @dataclass
 class Design:
-    bust_ease: float = 5.5
-    hip_ease: float = 8.0  # half of it is for the cloth that hangs clear of the belly
-    biceps_ease: float = 4.0
+    bust_ease: float = 9.0
+    hip_ease: float = 14.0  # half of it is for the cloth that hangs clear of the belly
+    biceps_ease: float = 5.0
     armhole_ease: float = 2.0  # the armhole's bottom below the armpit
     neck_front: float = 8.5  # depth of the neckline below its side
     neck_back: float = 2.0

@@ -45,6 +45,33 @@ struct Wearer {
     weights: Vec<Vec<Complex64>>,
 }
 
+/// A residual of the unknowns alone.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Prior {
+    /// \[–\].
+    pub value: f64,
+    /// Its derivatives, by unknown \[1/m\].
+    pub by: Vec<(usize, f64)>,
+}
+
+impl Prior {
+    fn new(weight: f64, value: f64, first: usize, by: impl Iterator<Item = f64>) -> Self {
+        let by = by.enumerate().filter(|(_, d)| *d != 0.0);
+        Self {
+            value: weight * value,
+            by: by.map(|(j, d)| (first + j, weight * d)).collect(),
+        }
+    }
+
+    /// Writes the derivatives into `row`, which is zero, and returns the residual.
+    pub fn fill(&self, row: &mut [f64]) -> f64 {
+        for (j, slope) in &self.by {
+            row[*j] = *slope;
+        }
+        self.value
+    }
+}
+
 /// What a cage can do.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -78,7 +105,7 @@ impl Default for CageParams {
     fn default() -> Self {
         Self {
             kind: CageKind::default(),
-            max_control_points: 12,
+            max_control_points: 16,
             margin: 0.3,
             least_stretch: 0.2,
         }
@@ -234,22 +261,40 @@ impl Cages {
             .collect()
     }
 
-    /// The unknowns that are β's, with the panel's size ρ \[m\]: `|β| = |ζ_j| / ρ`, 0 at rest.
-    pub fn affine_unknowns(&self) -> Vec<(usize, f64)> {
-        let affine = |(cage, first): (&Cage, &usize)| {
-            let beta = cage.control.len();
-            let unknowns = cage.unknowns.iter().enumerate();
-            let betas: Vec<_> = unknowns
-                .filter(|(_, moved)| moved[0].0 == beta)
-                .map(|(j, _)| (first + j, cage.size))
-                .collect();
-            betas
-        };
-        self.each
-            .iter()
-            .zip(&self.offsets)
-            .flat_map(affine)
-            .collect()
+    /// What a cage had better not do, as residuals of the unknowns with their derivatives: stretch
+    /// unevenly in two directions (|β| of each panel, to weigh `affine`), and change neighbouring
+    /// sides by different similarities (to weigh `unevenness`), which keeps control points that
+    /// hardly move the cloth from wandering until the cage crosses itself.
+    pub fn priors(&self, zeta: &[f64], affine: f64, unevenness: f64) -> Vec<Prior> {
+        let (affine, unevenness) = (affine.sqrt(), unevenness.sqrt());
+        let mut priors = Vec::new();
+        for ((cage, first), handles) in self.each.iter().zip(&self.offsets).zip(self.handles(zeta))
+        {
+            let mut add = |stencil: &[(usize, Complex64)], weight: f64| {
+                let value: Complex64 = stencil.iter().map(|(h, a)| a * handles[*h]).sum();
+                let by = cage.along_unknowns(stencil);
+                priors.push(Prior::new(
+                    weight,
+                    value.re,
+                    *first,
+                    by.iter().map(|d| d.re),
+                ));
+                priors.push(Prior::new(
+                    weight,
+                    value.im,
+                    *first,
+                    by.iter().map(|d| d.im),
+                ));
+            };
+            if cage.affine {
+                let one = Complex64::new(1.0 / cage.size, 0.0);
+                add(&[(cage.control.len(), one)], affine);
+            }
+            for stencil in cage.side_differences() {
+                add(&stencil, unevenness);
+            }
+        }
+        priors
     }
 
     /// Directions in ζ, orthonormal, that move panels as rigid bodies and so do nothing to the drape:

@@ -29,11 +29,11 @@ pub struct DescentParams {
 impl Default for DescentParams {
     fn default() -> Self {
         Self {
-            iterations: 30,
+            iterations: 40,
             refusals: 6,
             damping: 1e-2,
             step: 0.03,
-            tolerance: 1e-2,
+            tolerance: 2e-3,
             least_step: 2e-4,
         }
     }

@@ -1,4 +1,5 @@
-//! What the refit minimises (paper §4.4): four terms, each a sum of squared residuals, each without
+//! What the refit minimises (paper §4.4): four terms, and two that keep a
+//! pattern fit for meshing and drawing, each a sum of squared residuals, each without
 //! dimension and independent of resolution and unit.
 //!
 //! A term states its residuals as [`Row`]s, each with its derivatives beside its value. Loss,
@@ -6,6 +7,8 @@
 
 pub mod area;
 pub mod curvature;
+pub mod drawable;
+pub mod quality;
 pub mod seam_length;
 pub mod shape_match;
 
@@ -41,11 +44,20 @@ pub struct LossParams {
     pub seam_length: f64,
     /// Mismatch of whole stitches beyond the designed ease, where small ones would add up.
     pub whole_seam: f64,
-    /// Area of each panel's drape against x*; 300 makes 1 % of area 0.03.
+    /// Area of each panel's drape against x*; 100 makes 1 % of area 0.01.
     pub area: f64,
+    /// Triangles of the pattern flatter than the reference's flattest: 300 makes 10 % less quality
+    /// a loss of 3. Not in the paper.
+    pub quality: f64,
+    /// Edges that leave what one cubic curve can follow: 1 makes 1 mm rms on one edge a loss of 1.
+    /// Not in the paper.
+    pub drawable: f64,
     /// Preference for conformal cages: the squared stretch |β|² that each panel's affine part may
-    /// add (`cage.kind = "green-affine"`); 1 makes 10 % stretch 0.01. Not in the paper.
+    /// add (`cage.kind = "green-affine"`); 0.1 makes 10 % stretch 0.001. Not in the paper.
     pub affine: f64,
+    /// Preference for cages whose neighbouring sides change alike: the squared difference of their
+    /// similarities; 0.01 makes a side that turns by 10° beside a fixed one 0.0003. Not in the paper.
+    pub cage: f64,
 }
 
 impl Default for LossParams {
@@ -54,11 +66,14 @@ impl Default for LossParams {
             boundary: 1.0,
             seam: 1.0,
             interior: 0.05,
-            curvature: 0.05,
+            curvature: 0.01,
             seam_length: 300.0,
             whole_seam: 3000.0,
-            area: 300.0,
-            affine: 1.0,
+            area: 100.0,
+            quality: 300.0,
+            drawable: 2.0,
+            affine: 0.1,
+            cage: 0.01,
         }
     }
 }
@@ -80,6 +95,10 @@ pub struct LossTerms {
     pub whole_seam: f64,
     /// Squared relative change of panel areas \[–\].
     pub area: f64,
+    /// Squared relative shortfall of triangle quality \[–\].
+    pub quality: f64,
+    /// Mean squared distance of edges from one cubic curve, summed over edges \[mm²\].
+    pub drawable: f64,
 }
 
 impl LossTerms {
@@ -97,6 +116,8 @@ impl LossTerms {
             + weights.seam_length * self.seam_length
             + weights.whole_seam * self.whole_seam
             + weights.area * self.area
+            + weights.quality * self.quality
+            + weights.drawable * self.drawable
     }
 }
 
@@ -108,6 +129,8 @@ pub struct Losses {
     curvature: curvature::Curvature,
     seams: seam_length::SeamLength,
     area: area::TotalArea,
+    quality: quality::Quality,
+    drawable: drawable::Drawable,
 }
 
 /// The loss at one drape, with its gradients.
@@ -137,6 +160,8 @@ impl Losses {
             curvature: curvature::Curvature::new(mesh),
             seams: seam_length::SeamLength::new(pattern, mesh),
             area: area::TotalArea::new(mesh, x_star),
+            quality: quality::Quality::new(mesh),
+            drawable: drawable::Drawable::new(mesh),
         }
     }
 
@@ -146,7 +171,7 @@ impl Losses {
     }
 
     /// Residuals of every term with the term's weight, in the order of [`LossParams`].
-    fn weighted_rows(&self, x: &[Vec3], x_bar: &[Vec2]) -> [(f64, Vec<Row>); 7] {
+    fn weighted_rows(&self, x: &[Vec3], x_bar: &[Vec2]) -> [(f64, Vec<Row>); 9] {
         let w = &self.weights;
         let [boundary, seam, interior] = self.shape.rows(x);
         let (pieces, whole) = self.seams.rows(x_bar);
@@ -158,6 +183,8 @@ impl Losses {
             (w.seam_length, pieces),
             (w.whole_seam, whole),
             (w.area, self.area.rows(x)),
+            (w.quality, self.quality.rows(x_bar)),
+            (w.drawable, self.drawable.rows(x_bar)),
         ]
     }
 
@@ -173,7 +200,7 @@ impl Losses {
     pub fn evaluate(&self, x: &[Vec3], x_bar: &[Vec2]) -> Loss {
         let mut x_hat = vec![Vec3::zeros(); x.len()];
         let mut x_bar_hat = vec![Vec2::zeros(); x_bar.len()];
-        let mut values = [0.0; 7];
+        let mut values = [0.0; 9];
         for (value, (weight, rows)) in values.iter_mut().zip(self.weighted_rows(x, x_bar)) {
             for row in &rows {
                 *value += row.value * row.value;
@@ -193,6 +220,8 @@ impl Losses {
             seam_length,
             whole_seam,
             area,
+            quality,
+            drawable,
         ] = values;
         let terms = LossTerms {
             boundary,
@@ -202,6 +231,8 @@ impl Losses {
             seam_length,
             whole_seam,
             area,
+            quality,
+            drawable,
         };
         Loss {
             total: terms.total(&self.weights),

@@ -129,6 +129,30 @@ impl Cage {
         self.unknowns.iter().map(first)
     }
 
+    /// Derivatives of `Σ a_h handle_h` by the unknowns.
+    pub(super) fn along_unknowns(&self, stencil: &[(usize, Complex64)]) -> Vec<Complex64> {
+        let mut slopes = vec![Complex64::ZERO; self.handle_count()];
+        for (h, a) in stencil {
+            slopes[*h] += a;
+        }
+        let along =
+            |moved: &Vec<(usize, Complex64)>| moved.iter().map(|(h, d)| slopes[*h] * d).sum();
+        self.unknowns.iter().map(along).collect()
+    }
+
+    /// At each control point the difference T_j − T_{j−1} of the factors T = e/ē by which its two
+    /// sides change, as a stencil of the handles \[1/m\].
+    pub(super) fn side_differences(&self) -> Vec<[(usize, Complex64); 3]> {
+        let n = self.control.len();
+        let at = |j: usize| {
+            let (before, after) = ((j + n - 1) % n, (j + 1) % n);
+            let next = (self.control[after] - self.control[j]).inv();
+            let previous = (self.control[j] - self.control[before]).inv();
+            [(after, next), (j, -next - previous), (before, previous)]
+        };
+        (0..n).map(at).collect()
+    }
+
     /// Handle values at rest: where the control points are, and no β'.
     pub(super) fn rest_handles(&self) -> Vec<Complex64> {
         let mut handles = self.control.clone();

@@ -21,7 +21,7 @@ const ROUNDS: usize = 12;
 /// Weight of the mean squared strain that remains: 1 % costs 0.1.
 const STRAIN: f64 = 1000.0;
 /// No triangle may fall below this part of the reference pattern's poorest; leaves the search room.
-const LEAST_QUALITY: f64 = 0.92;
+const LEAST_QUALITY: f64 = 0.85;
 /// Damping of the fits, for what nothing determines.
 const DAMPING: f64 = 1e-4;
 
@@ -49,11 +49,15 @@ pub(super) fn flatten(
         for wanted in &wanted {
             rows.extend(wanted.rows(&x_bar, (STRAIN * wanted.rest.area / area).sqrt()));
         }
-        let model = Model::new(rows.len(), motions.len(), |i, by| {
+        let priors = cages.priors(&zeta, losses.weights().affine, losses.weights().cage);
+        let model = Model::new(rows.len() + priors.len(), motions.len(), |i, by| {
+            let Some(row) = rows.get(i) else {
+                return priors[i - rows.len()].fill(by);
+            };
             for (by, motion) in by.iter_mut().zip(motions) {
-                *by = slope(&rows[i], &[], motion);
+                *by = slope(row, &[], motion);
             }
-            rows[i].value
+            row.value
         });
         let Some(mut step) = model.step(DAMPING) else {
             return zeta;

@@ -4,7 +4,7 @@
 //! new rest shape can be cut, its drape comes to rest, and the loss falls.
 
 use super::{Clock, Found, Observer, Progress, RefitError};
-use crate::cage::Cages;
+use crate::cage::{Cages, Prior};
 use crate::descent::{Damping, DescentParams, Model};
 use crate::geometry::quality::qualities;
 use crate::geometry::{Vec2, Vec3};
@@ -45,7 +45,7 @@ struct Point<'a> {
     zeta: Vec<f64>,
     state: Differentiable<'a>,
     loss: Loss,
-    /// Weighted loss with the affine prior.
+    /// Weighted loss with the cages' priors.
     total: f64,
 }
 
@@ -171,8 +171,8 @@ impl<'s, S: Surface> Search<'s, S> {
         }
         let state = found.differentiable(self.scene)?;
         let loss = self.losses.evaluate(&state.drape.x, &state.drape.x_bar);
-        let priors = self.affine_rows(&zeta);
-        let total = loss.total + priors.iter().map(|(_, r, _)| r * r).sum::<f64>();
+        let priors = self.priors(&zeta);
+        let total = loss.total + priors.iter().map(|p| p.value * p.value).sum::<f64>();
         Some(Point {
             zeta,
             state,
@@ -181,13 +181,10 @@ impl<'s, S: Surface> Search<'s, S> {
         })
     }
 
-    /// The prior that prefers conformal maps: rows (unknown, residual, derivative).
-    fn affine_rows(&self, zeta: &[f64]) -> Vec<(usize, f64, f64)> {
-        let weight = self.losses.weights().affine.sqrt();
-        let affine = self.cages.affine_unknowns().into_iter();
-        affine
-            .map(|(j, size)| (j, weight * zeta[j] / size, weight / size))
-            .collect()
+    /// What the cages had better not do.
+    fn priors(&self, zeta: &[f64]) -> Vec<Prior> {
+        let weights = self.losses.weights();
+        self.cages.priors(zeta, weights.affine, weights.cage)
     }
 
     /// The Gauss–Newton model at `best`: residuals of all terms by all unknowns, through drape and
@@ -196,7 +193,7 @@ impl<'s, S: Surface> Search<'s, S> {
         let drape = &best.state.drape;
         let moves = best.state.sensitivities(self.motions.iter().cloned());
         let rows = self.losses.rows(&drape.x, &drape.x_bar);
-        let priors = self.affine_rows(&best.zeta);
+        let priors = self.priors(&best.zeta);
         let count = rows.len() + priors.len();
         Model::new(count, self.motions.len(), |i, by| {
             if let Some(row) = rows.get(i) {
@@ -205,14 +202,12 @@ impl<'s, S: Surface> Search<'s, S> {
                 }
                 row.value
             } else {
-                let (j, value, slope) = priors[i - rows.len()];
-                by[j] = slope;
-                value
+                priors[i - rows.len()].fill(by)
             }
         })
     }
 
-    /// Tries ever shorter steps until one is accepted.
+    /// Tries ever shorter steps until one is accepted. A pattern that cannot be cut costs no drape.
     fn step(
         &self,
         best: &Point<'_>,
@@ -222,14 +217,19 @@ impl<'s, S: Surface> Search<'s, S> {
     ) -> Stepped<'s> {
         let model = self.model(best);
         let rigid = self.cages.rigid_modes(&best.zeta);
-        for _ in 0..self.params.refusals {
+        let mut refusals = 0;
+        while refusals < self.params.refusals {
             let Some(mut step) = model.step(damping.0) else {
                 return Stepped::NoBetter;
             };
             without(&mut step, &rigid);
-            let Some(zeta) = self.cuttable(best, &mut step, floor) else {
+            let Some(zeta) = self.within_reach(best, &mut step) else {
                 return Stepped::NoBetter;
             };
+            if !can_be_cut(self.cages, self.mesh, &zeta, floor) {
+                damping.tighten();
+                continue;
+            }
             let found = self.drape(&zeta, self.predict(best, &step), run);
             if found.status == RestStatus::Stopped {
                 return Stepped::Interrupted;
@@ -239,6 +239,7 @@ impl<'s, S: Surface> Search<'s, S> {
                 damping.relax();
                 return Stepped::Better(Box::new(next));
             }
+            refusals += 1;
             damping.tighten();
         }
         Stepped::NoBetter
@@ -257,25 +258,19 @@ impl<'s, S: Surface> Search<'s, S> {
             .map_or(Stepped::NoBetter, |next| Stepped::Better(Box::new(next)))
     }
 
-    /// Shortens `step` until no pattern vertex moves too far and the rest shape can be cut: cages
-    /// and outlines do not cross, and no triangle is poor or flipped.
-    fn cuttable(&self, best: &Point<'_>, step: &mut DVector<f64>, floor: f64) -> Option<Vec<f64>> {
-        loop {
+    /// The unknowns after `step`, shortened where it moves a pattern vertex too far; none if it
+    /// hardly moves any.
+    fn within_reach(&self, best: &Point<'_>, step: &mut DVector<f64>) -> Option<Vec<f64>> {
+        let after = |step: &DVector<f64>| -> Vec<f64> {
             let moved_by = best.zeta.iter().zip(step.iter());
-            let zeta: Vec<f64> = moved_by.map(|(z, d)| z + d).collect();
-            let x_bar = self.cages.deform(&zeta);
-            let moved = farthest(&x_bar, &best.state.drape.x_bar);
-            if !(moved > SHORTEST_TRIAL) {
-                return None;
-            }
-            if moved > self.params.step {
-                *step *= 0.999 * self.params.step / moved;
-            } else if can_be_cut(self.cages, self.mesh, &zeta, floor) {
-                return Some(zeta);
-            } else {
-                *step *= 0.5;
-            }
+            moved_by.map(|(z, d)| z + d).collect()
+        };
+        let moved = farthest(&self.cages.deform(&after(step)), &best.state.drape.x_bar);
+        if !(moved > SHORTEST_TRIAL) {
+            return None;
         }
+        *step *= (self.params.step / moved).min(1.0);
+        Some(after(step))
     }
 
     /// Where the drape goes to first order, if that is near enough to be believed.

@@ -18,10 +18,10 @@ pub const WRONG_SIDE: Rgb = [0.19, 0.045, 0.16];
 /// What must not be: a flipped triangle.
 pub const ALARM: Rgb = [0.80, 0.03, 0.02];
 
-/// Hue [turns] of the panels' colours; neighbours in the file's order are far apart.
+/// Hue \[turns\] of the panels' colours; neighbours in the file's order are far apart.
 const HUES: [f32; 10] = [0.66, 0.16, 0.44, 0.03, 0.76, 0.28, 0.56, 0.10, 0.88, 0.36];
 
-/// Lightness, chroma, hue [turns] along the distance scale.
+/// Lightness, chroma, hue \[turns\] along the distance scale.
 const SCALE: [[f32; 3]; 6] = [
     [0.93, 0.025, 0.60],
     [0.87, 0.090, 0.50],

@@ -10,7 +10,7 @@ const SHEET: &str = include_str!("font.txt");
 /// Of one glyph in the sheet.
 const COLUMNS: usize = 5;
 const LINES: usize = 9;
-/// Between glyphs, and for the space [dots].
+/// Between glyphs, and for the space \[dots\].
 const GAP: f32 = 1.7;
 const SPACE: f32 = 2.2;
 
@@ -80,7 +80,7 @@ impl Glyph {
         Self { dots, first, last }
     }
 
-    /// Distance to the next glyph's first column [dots].
+    /// Distance to the next glyph's first column \[dots\].
     fn advance(&self) -> f32 {
         if self.dots.as_flattened().iter().any(|dot| *dot) {
             (self.last - self.first) as f32 + GAP
