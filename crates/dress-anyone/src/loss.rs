@@ -44,7 +44,7 @@ pub struct LossParams {
     pub seam_length: f64,
     /// Mismatch of whole stitches beyond the designed ease, where small ones would add up.
     pub whole_seam: f64,
-    /// Area of each panel's drape against x*; 100 makes 1 % of area 0.01.
+    /// Area of each panel's drape against x*; 10 makes 1 % of area 0.001.
     pub area: f64,
     /// Triangles of the pattern flatter than the reference's flattest: 300 makes 10 % less quality
     /// a loss of 3. Not in the paper.
@@ -53,10 +53,10 @@ pub struct LossParams {
     /// Not in the paper.
     pub drawable: f64,
     /// Preference for conformal cages: the squared stretch |β|² that each panel's affine part may
-    /// add (`cage.kind = "green-affine"`); 0.1 makes 10 % stretch 0.001. Not in the paper.
+    /// add (`cage.kind = "green-affine"`); 0.01 makes 10 % stretch 0.0001. Not in the paper.
     pub affine: f64,
     /// Preference for cages whose neighbouring sides change alike: the squared difference of their
-    /// similarities; 0.01 makes a side that turns by 10° beside a fixed one 0.0003. Not in the paper.
+    /// similarities; 0.005 makes a side that turns by 10° beside a fixed one 0.00015. Not in the paper.
     pub cage: f64,
 }
 
@@ -66,14 +66,14 @@ impl Default for LossParams {
             boundary: 1.0,
             seam: 1.0,
             interior: 0.05,
-            curvature: 0.01,
+            curvature: 0.002,
             seam_length: 300.0,
             whole_seam: 3000.0,
-            area: 100.0,
+            area: 10.0,
             quality: 300.0,
-            drawable: 2.0,
-            affine: 0.1,
-            cage: 0.01,
+            drawable: 0.5,
+            affine: 0.01,
+            cage: 0.005,
         }
     }
 }
