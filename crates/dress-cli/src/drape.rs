@@ -66,7 +66,6 @@ pub fn run(arguments: &DrapeArguments) -> Result<String, Failure> {
     if found.status == RestStatus::Stopped && accepted.is_err() {
         return Err(RefitError::Stopped.into());
     }
-    accepted?;
 
     let mesh = &garment.mesh;
     let report = Report {
@@ -79,7 +78,9 @@ pub fn run(arguments: &DrapeArguments) -> Result<String, Failure> {
         iterations: found.iterations,
         seconds,
     };
+    // What did not come to rest is worth a look, too.
     results(arguments, &loaded, &body, &found, &report)?.write()?;
+    accepted?;
     if arguments.running.quiet {
         return Ok(String::new());
     }
