@@ -10,6 +10,7 @@ pub mod cloth;
 pub mod drape;
 pub mod energy;
 pub mod equilibrium;
+pub mod layers;
 pub mod sparse;
 pub mod step;
 pub mod system;

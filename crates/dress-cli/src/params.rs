@@ -49,13 +49,15 @@ pub const TEMPLATE: &str = include_str!("params.toml");
 const LIMIT: u64 = MEBIBYTE;
 
 /// Numbers that must be above zero: others may be zero, and none is negative.
-const POSITIVE: [&str; 11] = [
+const POSITIVE: [&str; 13] = [
     "read.resolution",
     "fabric.warp",
     "fabric.weft",
     "fabric.shear",
     "fabric.density",
     "sim.contact.stiffness",
+    "sim.layers.thickness",
+    "sim.layers.stiffness",
     "sim.step.dt",
     "sim.step.speed",
     "sim.equilibrium.step",

@@ -4,7 +4,9 @@
 use super::adjoint;
 use super::cloth::{Cloth, Rest};
 use super::energy::contact::{ContactParams, Surface};
-use super::equilibrium::{self, EquilibriumParams, RestStatus};
+use super::energy::layers::LayerParams;
+use super::equilibrium::{self, EquilibriumParams, RestStatus, Touch};
+use super::layers::{Layers, Watch, hold_apart};
 use super::sparse::Factor;
 use super::step::{State, StepParams, Stepper};
 use super::system::{Assembly, System};
@@ -17,6 +19,8 @@ use serde::{Deserialize, Serialize};
 pub struct SimParams {
     /// How cloth meets the body.
     pub contact: ContactParams,
+    /// How cloth meets cloth.
+    pub layers: LayerParams,
     /// XPBD, which brings placed panels together.
     pub step: StepParams,
     /// The static solve.
@@ -65,6 +69,7 @@ pub struct Drape {
     /// How the search ended.
     pub status: RestStatus,
     rest: Rest,
+    layers: Layers,
 }
 
 /// The body and its params, with what is prepared once for a cloth.
@@ -94,8 +99,12 @@ pub fn drape<S: Surface>(
         Start::Placed => (gather(scene, &rest, x, observe), params.equilibrium.cold),
         Start::Near => (x, params.equilibrium.warm),
     };
+    let mut layers = Layers::new(scene.cloth, params.layers, &x);
+    let touch = Touch::at(scene.cloth, &mut layers, &x, scene.assembly.clone());
     let found = equilibrium::find(
         &system(scene, &rest),
+        &mut layers,
+        touch,
         x,
         sigma,
         params.equilibrium.tolerance,
@@ -114,16 +123,17 @@ pub fn drape<S: Surface>(
         iterations: found.iterations,
         status: found.status,
         rest,
+        layers,
     }
 }
 
 fn system<'a, S>(scene: &Scene<'a, S>, rest: &'a Rest) -> System<'a, S> {
     System {
         cloth: scene.cloth,
-        assembly: scene.assembly,
         rest,
         surface: scene.surface,
         contact: scene.params.contact,
+        thickness: scene.params.layers.thickness,
     }
 }
 
@@ -144,6 +154,7 @@ fn gather<S: Surface>(
         scene.surface,
         scene.params.contact,
         step_params,
+        Watch::new(scene.cloth, scene.params.layers, &x),
     );
     let v = vec![Vec3::zeros(); x.len()];
     let mut state = State { x, v };
@@ -193,23 +204,41 @@ impl Drape {
         };
         let mut sigma = 0.0;
         let mut kicks = 0;
+        let assembly = scene.assembly.clone();
+        let mut touch = Touch::at(scene.cloth, &mut self.layers, &self.x, assembly);
         let (factor, shift) = loop {
             let start = std::mem::take(&mut self.x);
+            let layers = &mut self.layers;
             let still = &mut |_, _| true;
-            let found = equilibrium::find(&system, start, sigma, params.polished, &polish, still);
+            let found = equilibrium::find(
+                &system,
+                layers,
+                touch,
+                start,
+                sigma,
+                params.polished,
+                &polish,
+                still,
+            );
             self.iterations += found.iterations;
             self.residual = found.residual;
             self.x = found.x;
-            let (factor, shift) = shifted_factor(&system, &self.x)?;
+            touch = found.touch;
+            let (factor, shift) = shifted_factor(&system, &touch, &self.x)?;
             if shift == 0.0 || kicks == KICKS {
                 break (factor, shift);
             }
             kicks += 1;
             sigma = shift;
-            let mode = softest_mode(&system, &factor);
-            for (x, d) in self.x.iter_mut().zip(mode) {
-                *x += d * KICK;
+            let mut kick = softest_mode(&system, &factor);
+            for d in &mut kick {
+                *d *= KICK;
             }
+            hold_apart(&self.layers.pairs(&self.x, &kick, 0.0), &self.x, &mut kick);
+            for (x, d) in self.x.iter_mut().zip(kick) {
+                *x += d;
+            }
+            touch = Touch::at(scene.cloth, &mut self.layers, &self.x, touch.assembly);
         };
         Some(Differentiable {
             cloth: scene.cloth,
@@ -221,10 +250,14 @@ impl Drape {
 }
 
 /// Factor of K + σM with the smallest σ tried that makes it definite, and σ \[1/s²\].
-fn shifted_factor<S: Surface>(system: &System<'_, S>, x: &[Vec3]) -> Option<(Factor, f64)> {
+fn shifted_factor<S: Surface>(
+    system: &System<'_, S>,
+    touch: &Touch,
+    x: &[Vec3],
+) -> Option<(Factor, f64)> {
     let mut shift = 0.0;
     loop {
-        let mut k = system.stiffness(x, 1.0);
+        let mut k = system.stiffness(&touch.assembly, x, &touch.pairs, 1.0);
         k.add_diagonal(shift, &system.rest.mass);
         if let Some(factor) = k.factor() {
             return Some((factor, shift));

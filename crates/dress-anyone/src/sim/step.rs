@@ -8,6 +8,7 @@
 use super::cloth::{Cloth, GRAVITY, Rest};
 use super::energy::contact::{ContactParams, Surface};
 use super::energy::membrane::{Elasticity, constraint};
+use super::layers::Watch;
 use crate::geometry::{Mat3, Vec3};
 use serde::{Deserialize, Serialize};
 
@@ -68,6 +69,8 @@ pub struct Stepper<'a, S> {
     lambda_membrane: Vec<Vec3>,
     lambda_bend: Vec<Vec3>,
     lambda_hold: Vec<f64>,
+    /// Keeps layers of cloth apart.
+    watch: Watch,
 }
 
 /// A vertex near the body: its contact linearised once per step.
@@ -81,13 +84,14 @@ struct Touch {
 }
 
 impl<'a, S: Surface> Stepper<'a, S> {
-    /// Prepares to step.
+    /// Prepares to step; `watch` keeps the layers apart.
     pub fn new(
         cloth: &'a Cloth,
         rest: &'a Rest,
         surface: &'a S,
         contact: ContactParams,
         params: StepParams,
+        watch: Watch,
     ) -> Self {
         Self {
             compliance: inverse(&cloth.elasticity) / (params.dt * params.dt),
@@ -100,6 +104,7 @@ impl<'a, S: Surface> Stepper<'a, S> {
             surface,
             contact,
             params,
+            watch,
         }
     }
 
@@ -122,21 +127,27 @@ impl<'a, S: Surface> Stepper<'a, S> {
         self.lambda_bend.fill(Vec3::zeros());
         self.lambda_hold.fill(0.0);
         let mut touching = self.touching(&before);
+        let wish: Vec<Vec3> = state.x.iter().zip(&before).map(|(x, b)| x - b).collect();
+        let mut apart = self.watch.constraints(&before, &wish, 1.0 / (dt * dt));
         for _ in 0..self.params.sweeps {
             self.sweep_membrane(&mut state.x);
             self.sweep_bend(&mut state.x);
             self.sweep_holds(&mut state.x);
+            self.watch.sweep(&mut apart, &self.w, &mut state.x);
             self.sweep_contact(&mut touching, &mut state.x);
         }
         let tau = (-self.params.drag * dt).exp();
         let farthest = self.params.speed * dt;
-        for ((x, v), start) in state.x.iter_mut().zip(&mut state.v).zip(&before) {
+        for (x, start) in state.x.iter_mut().zip(&before) {
             let moved = *x - start;
             let length = moved.norm();
             if length > farthest {
                 *x = start + moved * (farthest / length);
             }
-            *v = (*x - start) * (tau / dt);
+        }
+        self.watch.restrain(&before, &mut state.x);
+        for ((x, v), start) in state.x.iter().zip(&mut state.v).zip(&before) {
+            *v = (x - start) * (tau / dt);
         }
     }
 
