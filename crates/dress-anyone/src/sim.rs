@@ -15,5 +15,5 @@ pub mod sparse;
 pub mod step;
 pub mod system;
 pub use cloth::{Cloth, Hold, Rest};
-pub use drape::{Drape, Scene, SimParams, Start, drape};
+pub use drape::{Drape, Scene, SimParams, Solver, Start, drape};
 pub use system::Assembly;

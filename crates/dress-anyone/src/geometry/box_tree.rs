@@ -117,15 +117,24 @@ impl BoxTree {
     }
 }
 
-/// The box around `points`, widened by `margin` \[m\] on all sides.
+/// The box around `points`, of which there is at least one, widened by `margin` \[m\] on all sides.
 pub fn around(points: &[Vec3], margin: f64) -> Aabb {
-    let (low, high) = super::bounds(points);
+    let (mut low, mut high) = (points[0], points[0]);
+    for p in &points[1..] {
+        low = Vec3::new(low.x.min(p.x), low.y.min(p.y), low.z.min(p.z));
+        high = Vec3::new(high.x.max(p.x), high.y.max(p.y), high.z.max(p.z));
+    }
     [low.add_scalar(-margin), high.add_scalar(margin)]
 }
 
 /// Whether two boxes have a point in common.
 fn overlap(a: &Aabb, b: &Aabb) -> bool {
-    (0..3).all(|c| a[0][c] <= b[1][c] && b[0][c] <= a[1][c])
+    a[0].x <= b[1].x
+        && b[0].x <= a[1].x
+        && a[0].y <= b[1].y
+        && b[0].y <= a[1].y
+        && a[0].z <= b[1].z
+        && b[0].z <= a[1].z
 }
 
 /// The box around boxes, of which there is at least one.

@@ -128,6 +128,10 @@ const EXACT_BELOW: f64 = 3.0;
 const LEAST_SIGMA: f64 = 1e-3;
 /// Below this part of the compressive stress none of it is tried.
 const LEAST_EXACTNESS: f64 = 0.1;
+/// Most by which the part of the compressive stress grows in one iteration.
+const MOST_GROWTH: f64 = 0.25;
+/// Least such growth: what a part that proves too large halves comes back with time.
+const LEAST_GROWTH: f64 = 0.05;
 /// Residual below which energy differences drown in round-off, and the residual itself must fall.
 const ROUND_OFF_BELOW: f64 = 1e-4;
 /// A garment whose centre moves this far \[m\] over [`SLIDE_WINDOW`] late iterations slides.
@@ -137,7 +141,7 @@ const SLIDE_WINDOW: usize = 10;
 /// Sliding is judged only after this many iterations.
 const SETTLED_AFTER: usize = 100;
 
-/// Finds the equilibrium near `x` to residual `tolerance`, starting with damping `sigma`.
+/// Finds the equilibrium near `x`, where layers touch as `touch` says, starting with damping `sigma`.
 /// `observe` is told the iteration and the residual, and may ask to stop by returning `false`.
 pub fn find<S: Surface>(
     system: &System<'_, S>,
@@ -145,7 +149,6 @@ pub fn find<S: Surface>(
     mut touch: Touch,
     mut x: Vec<Vec3>,
     mut sigma: f64,
-    tolerance: f64,
     params: &EquilibriumParams,
     observe: &mut dyn FnMut(usize, f64) -> bool,
 ) -> Equilibrium {
@@ -153,16 +156,20 @@ pub fn find<S: Surface>(
     let mut force = system.force(&x, &touch.pairs);
     let mut residual = system.residual(&force);
     let mut exactness: f64 = if residual < EXACT_BELOW { 1.0 } else { 0.0 };
+    let mut growth = MOST_GROWTH;
     let mut centres = vec![centre(&x)];
     let mut status = RestStatus::IterationLimit;
     let mut iterations = 0;
-    while iterations < params.iterations {
+    loop {
         if !residual.is_finite() {
             status = RestStatus::NotFinite;
             break;
         }
-        if residual < tolerance {
+        if residual < params.tolerance {
             status = RestStatus::AtRest;
+            break;
+        }
+        if iterations >= params.iterations {
             break;
         }
         if !observe(iterations, residual) {
@@ -173,6 +180,7 @@ pub fn find<S: Surface>(
         let Some(factor) = damped_factor(system, &touch, &x, sigma, exactness) else {
             // Less exact is more definite; not exact at all it is indefinite only by round-off.
             if exactness > 0.0 {
+                growth = (0.5 * growth).max(LEAST_GROWTH);
                 exactness = if exactness > LEAST_EXACTNESS {
                     0.4 * exactness
                 } else {
@@ -212,7 +220,8 @@ pub fn find<S: Surface>(
         if residual >= EXACT_BELOW {
             exactness = 0.0;
         } else {
-            exactness = (exactness + 0.25).min(1.0);
+            exactness = (exactness + growth).min(1.0);
+            growth = (1.5 * growth).min(MOST_GROWTH);
         }
         if step.fraction < 1.0 {
             sigma *= 2.0;

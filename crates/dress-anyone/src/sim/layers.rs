@@ -305,11 +305,15 @@ fn relative_move(kind: Kind, d: [Vec3; 4]) -> f64 {
 
 /// Boxes around the whole move of pieces with `N` corners, widened by `margin` \[m\].
 fn swept<const N: usize>(pieces: &[[u32; N]], x: &[Vec3], d: &[Vec3], margin: f64) -> Vec<Aabb> {
+    let of_vertex = |(p, d): (&Vec3, &Vec3)| around(&[*p, p + d], margin);
+    let vertices: Vec<Aabb> = x.iter().zip(d).map(of_vertex).collect();
     let boxed = |piece: &[u32; N]| {
-        let from = piece.map(|v| x[v as usize]);
-        let to = piece.map(|v| x[v as usize] + d[v as usize]);
-        let [a, b] = [around(&from, margin), around(&to, margin)];
-        [a[0].inf(&b[0]), a[1].sup(&b[1])]
+        let mut hull = vertices[piece[0] as usize];
+        for v in &piece[1..] {
+            let [low, high] = &vertices[*v as usize];
+            hull = [hull[0].inf(low), hull[1].sup(high)];
+        }
+        hull
     };
     pieces.iter().map(boxed).collect()
 }

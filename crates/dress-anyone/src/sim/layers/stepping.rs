@@ -60,6 +60,11 @@ impl Watch {
         }
     }
 
+    /// Whether layers went through each other when last looked at.
+    pub fn tangled(&self) -> bool {
+        self.layers.tangled()
+    }
+
     /// Constraints for a step from `x` that wants to move by `wish` \[m\].
     pub fn constraints(&mut self, x: &[Vec3], wish: &[Vec3], per_time: f64) -> Vec<Apart> {
         if !self.layers.params.on {
