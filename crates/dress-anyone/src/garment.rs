@@ -1,5 +1,6 @@
 //! A garment: pattern, sewing, fabric, and — once it has one — its drape.
 
+pub mod fabrics;
 mod summary;
 
 use crate::geometry::Vec3;

@@ -1,8 +1,10 @@
 //! Meshes and the questions asked of them; knows nothing of garments or bodies.
 
+pub mod box_tree;
 pub mod bvh;
 pub mod closest_point;
 pub mod groups;
+pub mod intersections;
 pub mod mesh;
 pub mod polygon;
 pub mod quality;

@@ -59,6 +59,10 @@ pub struct DrapeReport {
     pub deepest_penetration: f64,
     /// Cloth vertices inside the body's mesh.
     pub vertices_inside: usize,
+    /// Pairs of a cloth triangle and a body triangle that intersect.
+    pub through_body: usize,
+    /// Pairs of cloth triangles that intersect and share no vertex.
+    pub through_itself: usize,
     /// Smallest principal stretch of any triangle; below 0.6 the membrane model is out of its
     /// depth.
     pub least_stretch: f64,

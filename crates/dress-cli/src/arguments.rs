@@ -9,6 +9,7 @@ use dress_anyone::io::garment::GarmentOptions;
 use dress_anyone::io::garment_obj::UvOptions;
 use dress_anyone::io::garmentcode::RotationOrder;
 use dress_anyone::problem::BadInput;
+use dress_anyone::sim::Solver;
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
@@ -73,6 +74,12 @@ pub struct DrapeArguments {
     /// The body to drape it on (OBJ, PLY, STL)
     #[arg(long, value_name = "FILE")]
     pub body: PathBuf,
+    /// Start from this drape of the same garment (OBJ) [default: the placed panels]
+    #[arg(long, value_name = "FILE")]
+    pub from: Option<PathBuf>,
+    /// What brings the cloth to rest [default: static]
+    #[arg(long, value_name = "SOLVER")]
+    pub solver: Option<SolverKind>,
     /// Folder for the results
     #[arg(long, value_name = "FOLDER", default_value = "dress-out")]
     pub out: PathBuf,
@@ -115,6 +122,9 @@ pub struct ReadingArguments {
     /// Parameters (TOML); `dress params` prints them all
     #[arg(long, value_name = "FILE")]
     pub params: Option<PathBuf>,
+    /// What the cloth is made of: a name, or a file with the keys of [fabric] (TOML)
+    #[arg(long, value_name = "NAME|FILE")]
+    pub fabric: Option<PathBuf>,
     /// Length of mesh edges, where a pattern has to be meshed [default: 20]
     #[arg(long, value_name = "MM", value_parser = positive)]
     pub resolution: Option<f64>,
@@ -154,6 +164,15 @@ pub enum Cage {
     Green,
     /// May stretch and shear each panel as a whole, too
     GreenAffine,
+}
+
+/// [`Solver`].
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub enum SolverKind {
+    /// The static solve, to a true equilibrium
+    Static,
+    /// The paper's time steps alone
+    Xpbd,
 }
 
 /// [`RotationOrder`].
@@ -220,6 +239,9 @@ impl ReadingArguments {
         if let Some(millimetres) = self.resolution {
             params.read.resolution = 1e-3 * millimetres;
         }
+        if let Some(fabric) = &self.fabric {
+            params.refit.fabric = params::fabric(fabric)?;
+        }
         match self.panel_rotation {
             Some(Rotation::Intrinsic) => params.read.panel_rotation = RotationOrder::Intrinsic,
             Some(Rotation::Extrinsic) => params.read.panel_rotation = RotationOrder::Extrinsic,
@@ -247,6 +269,19 @@ impl ReadingArguments {
             metres_per_unit: self.body_unit.map(Unit::metres),
             up: self.body_up.map(Up::axis),
         }
+    }
+}
+
+impl DrapeArguments {
+    /// The parameters: the file's, overridden by the command line.
+    pub fn params(&self) -> Result<Params, BadInput> {
+        let mut params = self.reading.params()?;
+        match self.solver {
+            Some(SolverKind::Static) => params.refit.sim.solver = Solver::Static,
+            Some(SolverKind::Xpbd) => params.refit.sim.solver = Solver::Xpbd,
+            None => {}
+        }
+        Ok(params)
     }
 }
 

@@ -11,15 +11,19 @@ use crate::show::{Shown, contact_sheet};
 use crate::summary;
 use anyhow::Context;
 use dress_anyone::body::Body;
+use dress_anyone::garment::Garment;
+use dress_anyone::geometry::Vec3;
 use dress_anyone::io::garment::Loaded;
 use dress_anyone::io::output::{Output, check_writable};
 use dress_anyone::io::{garment_obj, svg};
+use dress_anyone::problem::{BadInput, Problem};
 use dress_anyone::refit::dress::drape_on;
 use dress_anyone::refit::{RefitError, accept, drape_report};
 use dress_anyone::report::DrapeReport;
 use dress_anyone::sim::Drape;
 use dress_anyone::sim::equilibrium::RestStatus;
 use serde::Serialize;
+use std::path::Path;
 use std::sync::atomic::Ordering;
 use std::time::Instant;
 
@@ -66,7 +70,6 @@ pub fn run(arguments: &DrapeArguments) -> Result<String, Failure> {
     if found.status == RestStatus::Stopped && accepted.is_err() {
         return Err(RefitError::Stopped.into());
     }
-    accepted?;
 
     let mesh = &garment.mesh;
     let report = Report {
@@ -79,7 +82,9 @@ pub fn run(arguments: &DrapeArguments) -> Result<String, Failure> {
         iterations: found.iterations,
         seconds,
     };
+    // What did not come to rest is worth a look, too.
     results(arguments, &loaded, &body, &found, &report)?.write()?;
+    accepted?;
     if arguments.running.quiet {
         return Ok(String::new());
     }
@@ -94,17 +99,40 @@ pub fn run(arguments: &DrapeArguments) -> Result<String, Failure> {
 /// Reads all inputs before complaining of any.
 fn read(arguments: &DrapeArguments) -> Result<(Params, Loaded, Body), Failure> {
     let mut gathering = Gathering::default();
-    let params = gathering.take(arguments.reading.params());
+    let params = gathering.take(arguments.params());
     let options = arguments
         .reading
         .garment(params.as_ref().unwrap_or(&Params::default()));
     let loaded = gathering.take(Input::File(&arguments.garment).garment(&options));
     let body = gathering.take(Input::File(&arguments.body).body(&arguments.reading.body()));
+    let from = arguments.from.as_ref().map(|file| {
+        let start = gathering.take(Input::File(file).garment(&options))?;
+        Some((file, start.garment))
+    });
     gathering.take(check_writable(&arguments.out));
     gathering.finish()?;
     let all = params.zip(loaded).zip(body);
-    let ((params, loaded), body) = all.expect("nothing was wrong with any of them");
+    let ((params, mut loaded), body) = all.expect("nothing was wrong with any of them");
+    if let Some((file, start)) = from.flatten() {
+        loaded.garment.drape = Some(same_mesh(&loaded.garment, file, start)?);
+    }
     Ok((params, loaded, body))
+}
+
+/// The drape of `start`, read from `file`, for a garment that must have the same mesh.
+fn same_mesh(garment: &Garment, file: &Path, start: Garment) -> Result<Vec<Vec3>, Failure> {
+    let same = start.mesh.cloth_triangles() == garment.mesh.cloth_triangles();
+    let bad = |text: &str| Failure::Inputs(vec![BadInput::one(file, Problem::whole(text))]);
+    match start.drape {
+        Some(x) if same => Ok(x),
+        Some(_) => Err(bad(
+            "this is no drape of the same mesh: drape the garment from its panels once, at the same \
+             resolution, and start from the garment.obj of that",
+        )),
+        None => Err(bad(
+            "this has no drape to start from: an OBJ has, a pattern has not",
+        )),
+    }
 }
 
 /// All files of a drape, in the unit and axes of the body's.

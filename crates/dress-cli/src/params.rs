@@ -4,6 +4,7 @@
 //! `dress params` prints; it is written by hand, and a test holds it to the defaults of the structs:
 //! same values, every key, each with a comment above it.
 
+use dress_anyone::garment::{Fabric, fabrics};
 use dress_anyone::io::file::{MEBIBYTE, read_capped};
 use dress_anyone::io::garmentcode::RotationOrder;
 use dress_anyone::problem::{BadInput, Problem};
@@ -49,13 +50,15 @@ pub const TEMPLATE: &str = include_str!("params.toml");
 const LIMIT: u64 = MEBIBYTE;
 
 /// Numbers that must be above zero: others may be zero, and none is negative.
-const POSITIVE: [&str; 11] = [
+const POSITIVE: [&str; 13] = [
     "read.resolution",
     "fabric.warp",
     "fabric.weft",
     "fabric.shear",
     "fabric.density",
     "sim.contact.stiffness",
+    "sim.layers.thickness",
+    "sim.layers.stiffness",
     "sim.step.dt",
     "sim.step.speed",
     "sim.equilibrium.step",
@@ -70,6 +73,34 @@ pub fn read(path: &Path) -> Result<Params, BadInput> {
     let text = String::from_utf8(bytes)
         .map_err(|_| bad(vec![Problem::whole("this is no text; parameters are TOML")]))?;
     parse(&text).map_err(bad)
+}
+
+/// The fabric that is called so, or else is in the TOML file at this path.
+pub fn fabric(name: &Path) -> Result<Fabric, BadInput> {
+    if let Some(found) = name.to_str().and_then(fabrics::named) {
+        return Ok(found.fabric);
+    }
+    let bad = |problems| BadInput::new(name, problems);
+    if !name.exists() {
+        let names: Vec<&str> = fabrics::ALL.iter().map(|fabric| fabric.name).collect();
+        return Err(bad(vec![Problem::whole(format!(
+            "there is no fabric of this name, and no such file; there are {}",
+            names.join(", ")
+        ))]));
+    }
+    let bytes = read_capped(name, LIMIT)?;
+    let text = String::from_utf8(bytes)
+        .map_err(|_| bad(vec![Problem::whole("this is no text; fabrics are TOML")]))?;
+    let given: Table = (text.parse()).map_err(|error| bad(vec![in_plain_words(&text, &error)]))?;
+    let defaults = defaults();
+    let known = defaults["fabric"].as_table().expect("[fabric] is a table");
+    let mut problems = Vec::new();
+    unknown_keys(&given, known, &mut vec![], &defaults, &mut problems);
+    numbers_out_of_range(&given, "fabric", &mut problems);
+    if !problems.is_empty() {
+        return Err(bad(problems));
+    }
+    toml::from_str(&text).map_err(|error| bad(vec![in_plain_words(&text, &error)]))
 }
 
 /// [`read`] of a file's text.
@@ -366,6 +397,24 @@ mod tests {
         for key in POSITIVE {
             assert!(keys.iter().any(|known| known == key), "{key}");
         }
+    }
+
+    #[test]
+    fn fabrics_are_names_or_files() {
+        let denim = fabric(Path::new("denim")).expect("a name");
+        assert_eq!(denim.density, 0.324);
+        let folder = tempfile::tempdir().expect("a folder");
+        let file = folder.path().join("my.toml");
+        std::fs::write(&file, "density = 0.15\nwarp = 2000\n").expect("writable");
+        let mine = fabric(&file).expect("a file");
+        assert_eq!(
+            (mine.density, mine.warp, mine.weft),
+            (0.15, 2000.0, Fabric::default().weft)
+        );
+        std::fs::write(&file, "densty = 0.15\nwarp = -1\n").expect("writable");
+        assert_eq!(fabric(&file).expect_err("two mistakes").problems.len(), 2);
+        let unknown = fabric(Path::new("felt")).expect_err("neither").to_string();
+        assert!(unknown.contains("denim"), "{unknown}");
     }
 
     #[test]

@@ -64,16 +64,26 @@ pub fn rest(status: RestStatus) -> &'static str {
     }
 }
 
-/// Whether cloth is inside the body.
+/// Whether cloth is inside the body, or passes through the body or itself.
 pub fn penetration(drape: &DrapeReport) -> String {
-    if drape.vertices_inside == 0 {
-        return "  penetration      none\n".to_owned();
-    }
-    format!(
-        "  penetration      {:.1} mm at most, {} points inside the body\n",
-        1e3 * drape.deepest_penetration,
-        drape.vertices_inside
-    )
+    let inside = if drape.vertices_inside == 0 {
+        "none".to_owned()
+    } else {
+        format!(
+            "{:.1} mm at most, {} points inside the body",
+            1e3 * drape.deepest_penetration,
+            drape.vertices_inside
+        )
+    };
+    let through = if drape.through_body + drape.through_itself == 0 {
+        "none".to_owned()
+    } else {
+        format!(
+            "{} pairs of triangles of cloth and body, {} of cloth and cloth",
+            drape.through_body, drape.through_itself
+        )
+    };
+    format!("  penetration      {inside}\n  intersections    {through}\n")
 }
 
 /// The seam whose two sides changed most unlike each other.

@@ -29,6 +29,7 @@ use dress_anyone::body::DistanceField;
 use dress_anyone::cage::{CageParams, Cages};
 use dress_anyone::geometry::ClosestPoint;
 use dress_anyone::sim::equilibrium::EquilibriumParams;
+use dress_anyone::sim::layers::Watch;
 use dress_anyone::sim::step::{State, StepParams, Stepper};
 use dress_anyone::sim::system::System;
 use dress_anyone::sim::{Assembly, Scene, SimParams, Start, drape};
@@ -103,7 +104,8 @@ fn of_size(criterion: &mut Criterion, size: usize) -> Vec<summary::Row> {
         sweeps: 1,
         ..params.step
     };
-    let mut stepper = Stepper::new(&cloth, &rest, &surface, params.contact, one_sweep);
+    let watch = Watch::new(&cloth, params.layers, &at_rest);
+    let mut stepper = Stepper::new(&cloth, &rest, &surface, params.contact, one_sweep, watch);
     let mut state = State {
         x: at_rest.clone(),
         v: vec![nalgebra::zero(); vertices],
@@ -112,15 +114,15 @@ fn of_size(criterion: &mut Criterion, size: usize) -> Vec<summary::Row> {
 
     let system = System {
         cloth: &cloth,
-        assembly: &assembly,
         rest: &rest,
         surface: &surface,
         contact: params.contact,
+        thickness: params.layers.thickness,
     };
     group.bench_function("stiffness", |b| {
-        b.iter(|| system.stiffness(&at_rest, 1.0));
+        b.iter(|| system.stiffness(&assembly, &at_rest, &[], 1.0));
     });
-    let stiffness = system.stiffness(&at_rest, 0.0);
+    let stiffness = system.stiffness(&assembly, &at_rest, &[], 0.0);
     group.bench_function("factor", |b| b.iter(|| stiffness.factor()));
 
     group.bench_function("closest_point", |b| {

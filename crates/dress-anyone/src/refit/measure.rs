@@ -4,6 +4,7 @@ use super::written::Written;
 use crate::body::Body;
 use crate::garment::Garment;
 use crate::geometry::closest_point::ClosestPoint;
+use crate::geometry::intersections;
 use crate::geometry::quality::{QualitySummary, qualities};
 use crate::geometry::{Vec2, Vec3};
 use crate::loss::Losses;
@@ -134,11 +135,15 @@ pub fn drape_report(
         let [low, high] = principal_stretches(&f);
         stretch = (stretch.0.min(low), stretch.1.max(high));
     }
+    let cloth = mesh.cloth_triangles();
+    let (y, skin) = (&body.mesh.positions, &body.mesh.triangles);
     DrapeReport {
         status: drape.map_or(RestStatus::AtRest, |d| d.status),
         residual: drape.map_or(0.0, |d| d.residual),
         deepest_penetration: depths.iter().copied().fold(0.0, f64::max),
         vertices_inside: depths.iter().filter(|d| **d > 0.0).count(),
+        through_body: intersections::between(x, &cloth, y, skin).len(),
+        through_itself: intersections::within(x, &cloth).len(),
         least_stretch: stretch.0,
         most_stretch: stretch.1,
     }

@@ -37,6 +37,9 @@ pub struct Cloth {
     pub holds: Vec<Hold>,
     /// Cloth vertices of each triangle, right side in front.
     pub outward: Vec<[u32; 3]>,
+    /// The reference pattern \[m\]: what contact of layers is measured by, constant like
+    /// `reference_area`.
+    pub reference: Vec<Vec2>,
 }
 
 /// An edge of the welded mesh with a triangle on either side, as two pattern-space half hinges.
@@ -82,7 +85,13 @@ impl Cloth {
             density: fabric.density,
             holds: Vec::new(),
             outward: mesh.outward_triangles(),
+            reference: mesh.x_bar.clone(),
         }
+    }
+
+    /// Corners of triangle `t` in the reference pattern \[m\].
+    pub fn reference_corners(&self, t: usize) -> [Vec2; 3] {
+        self.rest_triangles[t].map(|v| self.reference[v as usize])
     }
 
     /// The rest quantities that follow from x̄.

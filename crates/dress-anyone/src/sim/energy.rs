@@ -2,4 +2,5 @@
 
 pub mod bend;
 pub mod contact;
+pub mod layers;
 pub mod membrane;

@@ -5,9 +5,12 @@
 //! clamped to positive semi-definite until the residual is small. Steps must lower the energy, so
 //! the path cannot end on a saddle that the exact stiffness shows.
 
+use super::cloth::Cloth;
 use super::energy::contact::Surface;
+use super::energy::layers::Pair;
+use super::layers::{Layers, hold_apart};
 use super::sparse::Factor;
-use super::system::System;
+use super::system::{Assembly, System};
 use crate::geometry::Vec3;
 use serde::{Deserialize, Serialize};
 
@@ -73,7 +76,51 @@ pub struct Equilibrium {
     pub iterations: usize,
     /// How it ended.
     pub status: RestStatus,
+    /// Layers that may touch there, and a matrix structure that couples those that do.
+    pub touch: Touch,
 }
+
+/// Layers that may touch at a state, and the matrix structure that goes with them.
+#[derive(Clone, Debug)]
+pub struct Touch {
+    /// All pairs closer than the thickness, and some more.
+    pub pairs: Vec<Pair>,
+    /// Couples the pairs that touch.
+    pub assembly: Assembly,
+}
+
+impl Touch {
+    /// Pairs near enough to touch at `x`, and structure for them; `assembly` is kept as long as it
+    /// has room for all that touch.
+    pub fn at(cloth: &Cloth, layers: &mut Layers, x: &[Vec3], assembly: Assembly) -> Self {
+        let still = vec![Vec3::zeros(); x.len()];
+        let mut touch = Self {
+            pairs: layers.pairs(x, &still, 0.0),
+            assembly,
+        };
+        touch.make_room(cloth, layers, x);
+        touch
+    }
+
+    /// Couples all pairs that touch at `x`. Those that nearly touch are taken in along with them,
+    /// so that the structure lasts for a while.
+    fn make_room(&mut self, cloth: &Cloth, layers: &mut Layers, x: &[Vec3]) {
+        let h = layers.thickness();
+        let touches = |pair: &Pair| {
+            let corners = pair.vertices.map(|a| x[a as usize]);
+            pair.closest(corners).r.norm() < h
+        };
+        let room = |pair: &Pair| !touches(pair) || self.assembly.couples(pair);
+        if !self.pairs.iter().all(room) {
+            let still = vec![Vec3::zeros(); x.len()];
+            let near = layers.pairs(x, &still, SPARE * h);
+            self.assembly = Assembly::coupling(cloth, &near);
+        }
+    }
+}
+
+/// Distance beyond the thickness, as a part of it, at which layers get room in the matrix.
+const SPARE: f64 = 0.5;
 
 /// Residual above which compressive stress is left out: far from rest it only makes steps fail.
 const EXACT_BELOW: f64 = 3.0;
@@ -81,6 +128,10 @@ const EXACT_BELOW: f64 = 3.0;
 const LEAST_SIGMA: f64 = 1e-3;
 /// Below this part of the compressive stress none of it is tried.
 const LEAST_EXACTNESS: f64 = 0.1;
+/// Most by which the part of the compressive stress grows in one iteration.
+const MOST_GROWTH: f64 = 0.25;
+/// Least such growth: what a part that proves too large halves comes back with time.
+const LEAST_GROWTH: f64 = 0.05;
 /// Residual below which energy differences drown in round-off, and the residual itself must fall.
 const ROUND_OFF_BELOW: f64 = 1e-4;
 /// A garment whose centre moves this far \[m\] over [`SLIDE_WINDOW`] late iterations slides.
@@ -90,30 +141,35 @@ const SLIDE_WINDOW: usize = 10;
 /// Sliding is judged only after this many iterations.
 const SETTLED_AFTER: usize = 100;
 
-/// Finds the equilibrium near `x` to residual `tolerance`, starting with damping `sigma`.
+/// Finds the equilibrium near `x`, where layers touch as `touch` says, starting with damping `sigma`.
 /// `observe` is told the iteration and the residual, and may ask to stop by returning `false`.
 pub fn find<S: Surface>(
     system: &System<'_, S>,
+    layers: &mut Layers,
+    mut touch: Touch,
     mut x: Vec<Vec3>,
     mut sigma: f64,
-    tolerance: f64,
     params: &EquilibriumParams,
     observe: &mut dyn FnMut(usize, f64) -> bool,
 ) -> Equilibrium {
-    let mut energy = system.energy(&x);
-    let mut force = system.force(&x);
+    let mut energy = system.energy(&x, &touch.pairs);
+    let mut force = system.force(&x, &touch.pairs);
     let mut residual = system.residual(&force);
     let mut exactness: f64 = if residual < EXACT_BELOW { 1.0 } else { 0.0 };
+    let mut growth = MOST_GROWTH;
     let mut centres = vec![centre(&x)];
     let mut status = RestStatus::IterationLimit;
     let mut iterations = 0;
-    while iterations < params.iterations {
+    loop {
         if !residual.is_finite() {
             status = RestStatus::NotFinite;
             break;
         }
-        if residual < tolerance {
+        if residual < params.tolerance {
             status = RestStatus::AtRest;
+            break;
+        }
+        if iterations >= params.iterations {
             break;
         }
         if !observe(iterations, residual) {
@@ -121,9 +177,10 @@ pub fn find<S: Surface>(
             break;
         }
         iterations += 1;
-        let Some(factor) = damped_factor(system, &x, sigma, exactness) else {
+        let Some(factor) = damped_factor(system, &touch, &x, sigma, exactness) else {
             // Less exact is more definite; not exact at all it is indefinite only by round-off.
             if exactness > 0.0 {
+                growth = (0.5 * growth).max(LEAST_GROWTH);
                 exactness = if exactness > LEAST_EXACTNESS {
                     0.4 * exactness
                 } else {
@@ -144,7 +201,9 @@ pub fn find<S: Surface>(
         for d in &mut direction {
             *d *= scale;
         }
-        let Some(step) = line_search(system, &x, &direction, energy, residual) else {
+        let near = layers.pairs(&x, &direction, 0.0);
+        hold_apart(&near, &x, &mut direction);
+        let Some(step) = line_search(system, &near, &x, &direction, energy, residual) else {
             if sigma > 1e12 {
                 status = RestStatus::Stalled;
                 break;
@@ -156,10 +215,13 @@ pub fn find<S: Surface>(
         force = step.force;
         residual = step.residual;
         energy = step.energy;
+        touch.pairs = near;
+        touch.make_room(system.cloth, layers, &x);
         if residual >= EXACT_BELOW {
             exactness = 0.0;
         } else {
-            exactness = (exactness + 0.25).min(1.0);
+            exactness = (exactness + growth).min(1.0);
+            growth = (1.5 * growth).min(MOST_GROWTH);
         }
         if step.fraction < 1.0 {
             sigma *= 2.0;
@@ -180,17 +242,19 @@ pub fn find<S: Surface>(
         residual,
         iterations,
         status,
+        touch,
     }
 }
 
 /// Factor of K + σM; none when it is not positive definite.
 fn damped_factor<S: Surface>(
     system: &System<'_, S>,
+    touch: &Touch,
     x: &[Vec3],
     sigma: f64,
     exactness: f64,
 ) -> Option<Factor> {
-    let mut k = system.stiffness(x, exactness);
+    let mut k = system.stiffness(&touch.assembly, x, &touch.pairs, exactness);
     k.add_diagonal(sigma, &system.rest.mass);
     k.factor()
 }
@@ -208,6 +272,7 @@ struct Step {
 /// energies cannot tell — the residual.
 fn line_search<S: Surface>(
     system: &System<'_, S>,
+    pairs: &[Pair],
     x: &[Vec3],
     direction: &[Vec3],
     energy: f64,
@@ -219,13 +284,13 @@ fn line_search<S: Surface>(
             .zip(direction)
             .map(|(p, d)| p + d * fraction)
             .collect();
-        let new_energy = system.energy(&moved);
+        let new_energy = system.energy(&moved, pairs);
         let lower = new_energy < energy;
         let drowned = residual < ROUND_OFF_BELOW && new_energy <= energy + 1e-10 * energy.abs();
         if !lower && !drowned {
             continue;
         }
-        let force = system.force(&moved);
+        let force = system.force(&moved, pairs);
         let new_residual = system.residual(&force);
         if drowned && new_residual >= residual {
             continue;

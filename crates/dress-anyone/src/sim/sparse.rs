@@ -106,6 +106,13 @@ impl Structure {
         Slot { column: b, below }
     }
 
+    /// Whether the pair (row a, column b), a > b, is coupled.
+    pub fn coupled(&self, a: u32, b: u32) -> bool {
+        self.rows[self.starts[b as usize]..self.starts[b as usize + 1]]
+            .binary_search(&a)
+            .is_ok()
+    }
+
     /// Non-zeros of the Cholesky factor.
     pub fn factor_size(&self) -> usize {
         self.symbolic.len_val()

@@ -3,12 +3,14 @@
 
 use super::cloth::{Cloth, GRAVITY, Rest};
 use super::energy::contact::{self, ContactParams, Surface};
+use super::energy::layers::Pair;
 use super::energy::membrane;
 use super::sparse::{BlockMatrix, Slot, Structure};
 use crate::geometry::Vec3;
 use std::sync::Arc;
 
-/// Where each element's blocks go in the stiffness matrix; the same for every x and x̄.
+/// Where each element's blocks go in the stiffness matrix; the same for every x and x̄, but for
+/// the layers of cloth that touch.
 #[derive(Clone, Debug)]
 pub struct Assembly {
     structure: Arc<Structure>,
@@ -36,9 +38,15 @@ const PAIRS: [(usize, usize); 10] = [
 impl Assembly {
     /// Prepares the matrix structure of `cloth` and orders its elimination.
     pub fn new(cloth: &Cloth) -> Self {
+        Self::coupling(cloth, &[])
+    }
+
+    /// The same, with room for the layers in `pairs` to touch.
+    pub fn coupling(cloth: &Cloth, pairs: &[Pair]) -> Self {
         let triangles = cloth.triangles.iter().map(<[u32; 3]>::as_slice);
         let hinges = cloth.hinges.iter().map(|h| h.vertices.as_slice());
-        let structure = Structure::new(cloth.vertex_count, triangles.chain(hinges));
+        let layers = pairs.iter().map(|p| p.vertices.as_slice());
+        let structure = Structure::new(cloth.vertex_count, triangles.chain(hinges).chain(layers));
         let slot = |a: u32, b: u32| structure.slot(a.max(b), a.min(b));
         Self {
             triangles: cloth
@@ -58,6 +66,14 @@ impl Assembly {
         }
     }
 
+    /// Whether there is room for the four vertices of a pair to act on each other.
+    pub fn couples(&self, pair: &Pair) -> bool {
+        let v = pair.vertices;
+        PAIRS.iter().all(|(i, j)| {
+            v[*i] == v[*j] || self.structure.coupled(v[*i].max(v[*j]), v[*i].min(v[*j]))
+        })
+    }
+
     /// Sparsity and elimination order.
     pub fn structure(&self) -> &Structure {
         &self.structure
@@ -68,20 +84,23 @@ impl Assembly {
 pub struct System<'a, S> {
     /// Topology and fabric.
     pub cloth: &'a Cloth,
-    /// Where blocks go.
-    pub assembly: &'a Assembly,
     /// What follows from x̄.
     pub rest: &'a Rest,
     /// The body.
     pub surface: &'a S,
     /// How cloth meets it.
     pub contact: ContactParams,
+    /// Distance at which layers of cloth begin to feel each other \[m\].
+    pub thickness: f64,
 }
 
 impl<S: Surface> System<'_, S> {
-    /// U \[J\].
-    pub fn energy(&self, x: &[Vec3]) -> f64 {
+    /// U \[J\]. `pairs` are all layers that may touch.
+    pub fn energy(&self, x: &[Vec3], pairs: &[Pair]) -> f64 {
         let mut sum = 0.0;
+        for pair in pairs {
+            sum += pair.energy(self.thickness, pair.vertices.map(|a| x[a as usize]));
+        }
         for (rest, t) in self.rest.triangles.iter().zip(&self.cloth.triangles) {
             sum += membrane::energy(rest, &self.cloth.elasticity, t.map(|a| x[a as usize]));
         }
@@ -100,8 +119,16 @@ impl<S: Surface> System<'_, S> {
     }
 
     /// f = −∂U/∂x \[N\].
-    pub fn force(&self, x: &[Vec3]) -> Vec<Vec3> {
+    pub fn force(&self, x: &[Vec3], pairs: &[Pair]) -> Vec<Vec3> {
         let mut f: Vec<Vec3> = self.rest.mass.iter().map(|m| GRAVITY * *m).collect();
+        for pair in pairs {
+            let corners = pair.vertices.map(|a| x[a as usize]);
+            if let Some(forces) = pair.force(self.thickness, corners) {
+                for (a, force) in pair.vertices.iter().zip(forces) {
+                    f[*a as usize] += force;
+                }
+            }
+        }
         for (rest, t) in self.rest.triangles.iter().zip(&self.cloth.triangles) {
             let forces = membrane::force(rest, &self.cloth.elasticity, t.map(|a| x[a as usize]));
             for (a, force) in t.iter().zip(forces) {
@@ -125,14 +152,36 @@ impl<S: Surface> System<'_, S> {
     }
 
     /// K = ∂²U/∂x² \[N/m\], with the part `exactness` of what can make an element indefinite:
-    /// compressive stress and contact curvature. 1 is exact, 0 positive semi-definite.
-    pub fn stiffness(&self, x: &[Vec3], exactness: f64) -> BlockMatrix {
-        let mut k = BlockMatrix::zeros(Arc::clone(&self.assembly.structure));
+    /// compressive stress and contact curvature. 1 is exact, 0 positive semi-definite. `assembly`
+    /// must couple those of the `pairs` that touch.
+    pub fn stiffness(
+        &self,
+        assembly: &Assembly,
+        x: &[Vec3],
+        pairs: &[Pair],
+        exactness: f64,
+    ) -> BlockMatrix {
+        let mut k = BlockMatrix::zeros(Arc::clone(&assembly.structure));
+        for pair in pairs {
+            let corners = pair.vertices.map(|a| x[a as usize]);
+            let Some(blocks) = pair.stiffness(self.thickness, corners, exactness) else {
+                continue;
+            };
+            let v = pair.vertices;
+            for (i, j) in PAIRS {
+                let slot = assembly.structure.slot(v[i].max(v[j]), v[i].min(v[j]));
+                if v[i] >= v[j] {
+                    k.add(slot, &blocks[i][j]);
+                } else {
+                    k.add(slot, &blocks[i][j].transpose());
+                }
+            }
+        }
         for (e, t) in self.cloth.triangles.iter().enumerate() {
             let corners = t.map(|a| x[a as usize]);
             let rest = &self.rest.triangles[e];
             let blocks = membrane::stiffness(rest, &self.cloth.elasticity, corners, exactness);
-            for (slot, (i, j)) in self.assembly.triangles[e].iter().zip(PAIRS) {
+            for (slot, (i, j)) in assembly.triangles[e].iter().zip(PAIRS) {
                 if t[i] >= t[j] {
                     k.add(*slot, &blocks[i][j]);
                 } else {
@@ -142,7 +191,7 @@ impl<S: Surface> System<'_, S> {
         }
         for (e, hinge) in self.cloth.hinges.iter().enumerate() {
             let rest = &self.rest.hinges[e];
-            for (slot, (i, j)) in self.assembly.hinges[e].iter().zip(PAIRS) {
+            for (slot, (i, j)) in assembly.hinges[e].iter().zip(PAIRS) {
                 let value = rest.stiffness * rest.k[i] * rest.k[j];
                 // The two corners opposite to a seam may be one vertex (the tip of a dart).
                 let twice = i != j && hinge.vertices[i] == hinge.vertices[j];
@@ -152,12 +201,12 @@ impl<S: Surface> System<'_, S> {
         for (a, p) in x.iter().enumerate() {
             let h = self.contact.thickness;
             if let Some(block) = contact::stiffness(self.surface, self.kappa(a), h, *p, exactness) {
-                k.add(self.assembly.vertices[a], &block);
+                k.add(assembly.vertices[a], &block);
             }
         }
         for hold in &self.cloth.holds {
             let block = crate::geometry::Mat3::from_diagonal(&Vec3::new(0.0, hold.stiffness, 0.0));
-            k.add(self.assembly.vertices[hold.vertex as usize], &block);
+            k.add(assembly.vertices[hold.vertex as usize], &block);
         }
         k
     }
@@ -180,6 +229,8 @@ mod tests {
     use crate::garment::Fabric;
     use crate::sim::cloth::{Hold, fixtures};
     use crate::sim::energy::contact::fixtures::Cone;
+    use crate::sim::energy::layers::LayerParams;
+    use crate::sim::layers::Layers;
 
     #[test]
     fn force_and_stiffness_are_derivatives_of_the_energy() {
@@ -191,7 +242,6 @@ mod tests {
             stiffness: 40.0,
         });
         let rest = cloth.at_rest(&mesh.x_bar);
-        let assembly = Assembly::new(&cloth);
         let surface = Cone {
             radius: 0.09,
             slope: 0.2,
@@ -204,10 +254,10 @@ mod tests {
         };
         let system = System {
             cloth: &cloth,
-            assembly: &assembly,
             rest: &rest,
             surface: &surface,
             contact,
+            thickness: 0.055,
         };
         let mut x = fixtures::rolled(&mesh, 0.6, 0.092);
         for (i, p) in x.iter_mut().enumerate() {
@@ -219,14 +269,33 @@ mod tests {
         let at = |s: f64| x.iter().zip(&d).map(|(p, d)| p + d * s).collect::<Vec<_>>();
         let dot = |a: &[Vec3], b: &[Vec3]| a.iter().zip(b).map(|(a, b)| a.dot(b)).sum::<f64>();
 
-        let slope = -dot(&system.force(&x), &d);
-        assert_derivative(|s| system.energy(&at(s)), slope, 1e-6, 1e-3, 1e-6);
-        let kd = system.stiffness(&x, 1.0).multiply(&d);
+        // Pairs of neighbours that a thickness this large lets touch, as layers would.
+        let layers = LayerParams {
+            thickness: system.thickness,
+            stiffness: 1e4,
+            ..LayerParams::default()
+        };
+        let mut without_neighbours = cloth.clone();
+        for p in &mut without_neighbours.reference {
+            *p *= 3.0;
+        }
+        let mut layers = Layers::new(&without_neighbours, layers, &x);
+        let pairs = layers.pairs(&x, &d.iter().map(|d| d * 1e-3).collect::<Vec<_>>(), 0.0);
+        let assembly = Assembly::coupling(&cloth, &pairs);
+        let touching = pairs.iter().filter(|pair| {
+            let corners = pair.vertices.map(|a| x[a as usize]);
+            pair.energy(system.thickness, corners) > 0.0
+        });
+        assert!(touching.count() > 20);
+
+        let slope = -dot(&system.force(&x, &pairs), &d);
+        assert_derivative(|s| system.energy(&at(s), &pairs), slope, 1e-6, 1e-3, 1e-6);
+        let kd = system.stiffness(&assembly, &x, &pairs, 1.0).multiply(&d);
         let q: Vec<Vec3> = (0..x.len())
             .map(|i| Vec3::from_fn(|c, _| noise(70 + 5 * i + c)))
             .collect();
         assert_derivative(
-            |s| -dot(&system.force(&at(s)), &q),
+            |s| -dot(&system.force(&at(s), &pairs), &q),
             dot(&kd, &q),
             1e-6,
             1e-3,

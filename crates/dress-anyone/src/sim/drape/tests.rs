@@ -1,0 +1,316 @@
+use super::*;
+use crate::check::{assert_derivative, noise};
+use crate::garment::Fabric;
+use crate::sim::cloth::{Hold, fixtures};
+use crate::sim::energy::contact::Nothing;
+use crate::sim::energy::contact::fixtures::{Cone, Floor};
+use approx::assert_relative_eq;
+
+const SOFT: Fabric = Fabric {
+    warp: 50.0,
+    weft: 80.0,
+    poisson: 0.2,
+    shear: 20.0,
+    bending: 1e-4,
+    density: 0.2,
+};
+
+fn settle<S: Surface>(scene: &Scene<'_, S>, x_bar: &[Vec2], x: Vec<Vec3>) -> Drape {
+    let drape = drape(scene, x_bar, x, Start::Near, &mut |_| true);
+    assert_eq!(
+        drape.status,
+        RestStatus::AtRest,
+        "residual {}",
+        drape.residual
+    );
+    drape
+}
+
+/// Directional derivative of a fixed linear function of the drape by the rest shape, against
+/// two complete drapes.
+fn check_gradient<S: Surface>(scene: &Scene<'_, S>, x_bar: &[Vec2], x: Vec<Vec3>, tolerance: f64) {
+    let weights: Vec<Vec3> = (0..x.len())
+        .map(|i| Vec3::from_fn(|c, _| noise(11 * i + c)))
+        .collect();
+    let direction: Vec<Vec2> = x_bar
+        .iter()
+        .enumerate()
+        .map(|(i, _)| Vec2::new(noise(7 * i), noise(7 * i + 3)))
+        .collect();
+    let at = settle(scene, x_bar, x)
+        .differentiable(scene)
+        .expect("a minimum");
+    assert_eq!(at.shift, 0.0);
+    let (hat, _) = at.pull_back(&weights);
+    let slope: f64 = hat.iter().zip(&direction).map(|(h, d)| h.dot(d)).sum();
+    let value = |s: f64| {
+        let moved: Vec<Vec2> = x_bar
+            .iter()
+            .zip(&direction)
+            .map(|(p, d)| p + d * s)
+            .collect();
+        let there = settle(scene, &moved, at.drape.x.clone())
+            .differentiable(scene)
+            .expect("a minimum");
+        there
+            .drape
+            .x
+            .iter()
+            .zip(&weights)
+            .map(|(x, w)| x.dot(w))
+            .sum::<f64>()
+    };
+    assert_derivative(value, slope, 1e-7, 1e-6, tolerance);
+    let forward = at.sensitivities(std::iter::once(direction));
+    let pushed: f64 = forward
+        .chunks_exact(3)
+        .zip(&weights)
+        .map(|(d, w)| d[0] * w.x + d[1] * w.y + d[2] * w.z)
+        .sum();
+    assert_relative_eq!(pushed, slope, max_relative = 1e-8);
+}
+
+/// Makes one side of a tube longer, so that it knows which way round it wants to hang.
+fn skew(mesh: &mut crate::pattern::PatternMesh) {
+    let width = mesh.x_bar.iter().map(|p| p.x).fold(0.0, f64::max);
+    for p in &mut mesh.x_bar {
+        p.y *= 1.0 + 0.2 * (std::f64::consts::TAU * p.x / width).sin();
+    }
+}
+
+fn firm_contact() -> SimParams {
+    let layers = LayerParams {
+        on: false,
+        ..LayerParams::default()
+    };
+    let contact = ContactParams {
+        thickness: 0.003,
+        stiffness: 1e5,
+    };
+    SimParams {
+        contact,
+        layers,
+        ..SimParams::default()
+    }
+}
+
+#[test]
+fn the_gradient_of_a_skirt_agrees_with_two_drapes() {
+    // Held at the waist, wide enough to fold below it, on a flattened cone.
+    let mut mesh = fixtures::tube(24, 10, 0.04);
+    skew(&mut mesh);
+    let mut cloth = Cloth::new(&mesh, &SOFT);
+    cloth.holds = (240..264)
+        .map(|vertex| Hold {
+            vertex,
+            height: 0.0,
+            stiffness: 30.0,
+        })
+        .collect();
+    let assembly = Assembly::new(&cloth);
+    let cone = Cone {
+        radius: 0.14,
+        slope: 0.2,
+        flat: 1.2,
+        lean: 0.1,
+    };
+    let params = firm_contact();
+    let scene = Scene {
+        cloth: &cloth,
+        assembly: &assembly,
+        surface: &cone,
+        params: &params,
+    };
+    let mut x = fixtures::rolled(&mesh, 0.96, 0.16);
+    for (i, p) in x.iter_mut().enumerate() {
+        *p += Vec3::from_fn(|c, _| 1e-3 * noise(3 * i + c)) - Vec3::y() * 0.4;
+    }
+    // The differences' own error, which falls with the square of their step.
+    check_gradient(&scene, &mesh.x_bar, x, 1e-5);
+}
+
+#[test]
+fn the_gradient_of_a_tight_tube_agrees_with_two_drapes() {
+    let mut mesh = fixtures::tube(24, 6, 0.025);
+    skew(&mut mesh);
+    let cloth = Cloth::new(&mesh, &SOFT);
+    let assembly = Assembly::new(&cloth);
+    // Circumference 0.6 m on a cone of 0.6 m and more: held by the slope alone.
+    let cone = Cone {
+        radius: 0.1,
+        slope: 0.3,
+        flat: 1.1,
+        lean: 0.2,
+    };
+    let params = firm_contact();
+    let scene = Scene {
+        cloth: &cloth,
+        assembly: &assembly,
+        surface: &cone,
+        params: &params,
+    };
+    let x = fixtures::rolled(&mesh, 0.6, 0.11);
+    check_gradient(&scene, &mesh.x_bar, x, 1e-7);
+}
+
+/// Two tubes as one cloth, the outer one 4 % wider at rest.
+fn nested(inner: &crate::pattern::PatternMesh) -> crate::pattern::PatternMesh {
+    let mut both = inner.clone();
+    let (rest_count, count) = (inner.x_bar.len(), inner.cloth_vertex_count);
+    let outer = inner.x_bar.iter().map(|p| Vec2::new(1.04 * p.x, p.y));
+    both.x_bar.extend(outer);
+    let triangles = inner.triangles.iter();
+    both.triangles
+        .extend(triangles.map(|t| t.map(|v| v + rest_count as u32)));
+    both.sewing
+        .extend(inner.sewing.iter().map(|v| v + count as u32));
+    both.cloth_vertex_count = 2 * count;
+    both
+}
+
+#[test]
+fn the_gradient_of_one_tube_over_another_agrees_with_two_drapes() {
+    let mut inner = fixtures::tube(24, 6, 0.025);
+    skew(&mut inner);
+    let mesh = nested(&inner);
+    let cloth = Cloth::new(&mesh, &SOFT);
+    let assembly = Assembly::new(&cloth);
+    let cone = Cone {
+        radius: 0.1,
+        slope: 0.3,
+        flat: 1.1,
+        lean: 0.2,
+    };
+    let params = SimParams {
+        layers: LayerParams {
+            on: true,
+            thickness: 5e-3,
+            stiffness: 1e5,
+        },
+        ..firm_contact()
+    };
+    let scene = Scene {
+        cloth: &cloth,
+        assembly: &assembly,
+        surface: &cone,
+        params: &params,
+    };
+    let mut x = fixtures::rolled(&inner, 0.6, 0.11);
+    // The outer one turned by a fraction of a column, so that vertices do not lie on vertices.
+    let (sine, cosine) = 0.07_f64.sin_cos();
+    let outer: Vec<Vec3> = (x.iter())
+        .map(|p| Vec3::new(cosine * p.x + sine * p.z, p.y, cosine * p.z - sine * p.x))
+        .map(|p| Vec3::new(1.12 * p.x, p.y, 1.12 * p.z))
+        .collect();
+    x.extend(outer);
+    let first = settle(&scene, &mesh.x_bar, x);
+    let mut layers = Layers::new(&cloth, params.layers, &first.x);
+    assert!(!layers.tangled());
+    let still = vec![Vec3::zeros(); first.x.len()];
+    // All but the rims of the 168 vertices of the outer tube lie on the inner one.
+    let touching = layers.pairs(&first.x, &still, 0.0).len();
+    assert!(touching > 100, "{touching} pairs touch");
+    check_gradient(&scene, &mesh.x_bar, first.x, 1e-5);
+}
+
+#[test]
+fn a_tight_tube_presses_as_laplace_says() {
+    // p = N/R: hoop tension over radius, on a smooth cylinder without weight to speak of.
+    let mesh = fixtures::tube(60, 6, 0.01);
+    let fabric = Fabric {
+        density: 1e-4,
+        bending: 1e-9,
+        poisson: 0.0,
+        ..SOFT
+    };
+    let cloth = Cloth::new(&mesh, &fabric);
+    let assembly = Assembly::new(&cloth);
+    let radius = 0.1;
+    let cylinder = Cone {
+        radius,
+        slope: 0.0,
+        flat: 1.0,
+        lean: 0.0,
+    };
+    let params = SimParams {
+        contact: ContactParams {
+            thickness: 0.0,
+            stiffness: 1e8,
+        },
+        equilibrium: EquilibriumParams {
+            tolerance: 1e-4,
+            ..Default::default()
+        },
+        ..SimParams::default()
+    };
+    let scene = Scene {
+        cloth: &cloth,
+        assembly: &assembly,
+        surface: &cylinder,
+        params: &params,
+    };
+    let x = fixtures::rolled(&mesh, 0.6, 0.1001);
+    let rest = cloth.at_rest(&mesh.x_bar);
+    let drape = drape(&scene, &mesh.x_bar, x, Start::Near, &mut |_| true);
+    let system = system(&scene, &rest);
+    let push: f64 = drape
+        .x
+        .iter()
+        .enumerate()
+        .map(|(a, p)| {
+            crate::sim::energy::contact::force(&cylinder, system.kappa(a), 0.0, *p).norm()
+        })
+        .sum();
+    // The polygon of 60 sides inscribed in the radius stretches to its own length, not 2πR.
+    let stretch = 60.0 * 2.0 * radius * (std::f64::consts::PI / 60.0).sin() / 0.6;
+    let tension = 80.0 * 0.5 * (stretch * stretch - 1.0) * stretch;
+    let expected = tension / radius * (std::f64::consts::TAU * radius * 0.06);
+    // The rims draw in a little where nothing pulls along the axis; 1 % covers it.
+    assert_relative_eq!(push, expected, max_relative = 1e-2);
+}
+
+#[test]
+fn a_sheet_on_the_floor_sinks_in_by_its_weight() {
+    let mesh = fixtures::sheet(6, 6, 0.05);
+    let cloth = Cloth::new(&mesh, &SOFT);
+    let assembly = Assembly::new(&cloth);
+    let floor = Floor { height: 0.0 };
+    let params = SimParams::default();
+    let scene = Scene {
+        cloth: &cloth,
+        assembly: &assembly,
+        surface: &floor,
+        params: &params,
+    };
+    let x = mesh
+        .x_bar
+        .iter()
+        .map(|p| Vec3::new(p.x, 0.004, p.y))
+        .collect();
+    let drape = drape(&scene, &mesh.x_bar, x, Start::Near, &mut |_| true);
+    let depth = 0.2 * 9.81 / params.contact.stiffness;
+    for p in &drape.x {
+        assert_relative_eq!(p.y, params.contact.thickness - depth, max_relative = 1e-6);
+    }
+}
+
+#[test]
+fn what_nothing_holds_falls_and_is_reported() {
+    let mesh = fixtures::sheet(3, 3, 0.05);
+    let cloth = Cloth::new(&mesh, &SOFT);
+    let assembly = Assembly::new(&cloth);
+    let params = SimParams::default();
+    let scene = Scene {
+        cloth: &cloth,
+        assembly: &assembly,
+        surface: &Nothing,
+        params: &params,
+    };
+    let x = mesh
+        .x_bar
+        .iter()
+        .map(|p| Vec3::new(p.x, p.y, 0.0))
+        .collect();
+    let drape = drape(&scene, &mesh.x_bar, x, Start::Near, &mut |_| true);
+    assert_eq!(drape.status, RestStatus::Sliding);
+}

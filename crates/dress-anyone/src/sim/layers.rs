@@ -1,0 +1,367 @@
+//! Which pieces of cloth may meet: broad phase, what is exempt, and moves that pass through nothing.
+//!
+//! Vertices are tested against triangles and edges against edges, over trees of boxes that enclose
+//! their whole move. Pieces that are sewn together, or within twice the contact thickness of each
+//! other along the mesh at rest, do not count as two layers. Neither do pieces that go through each
+//! other already ([`crate::geometry::intersections`]): holding these apart would hold them where
+//! they are.
+//!
+//! No layer passes another in a move that [`hold_apart`] has shortened: each pair of convex pieces
+//! is parted by a plane half way between its closest points, and no vertex reaches that plane (cf.
+//! Chen et al. 2025, Offset Geometric Contact, whose bounds are balls instead).
+
+mod stepping;
+mod untangle;
+
+use super::cloth::Cloth;
+use super::energy::layers::{Kind, LayerParams, Pair};
+use crate::geometry::box_tree::{Aabb, BoxTree, around};
+use crate::geometry::{Vec3, intersections};
+use rayon::prelude::*;
+use std::collections::BTreeMap;
+pub use stepping::Watch;
+
+/// The pieces of one cloth, ready to be searched.
+#[derive(Clone, Debug)]
+pub struct Layers {
+    params: LayerParams,
+    triangles: Vec<[u32; 3]>,
+    edges: Vec<[u32; 2]>,
+    /// Contact stiffness \[N/m\] of each vertex and each edge.
+    vertex_kappa: Vec<f64>,
+    edge_kappa: Vec<f64>,
+    /// Squared reference lengths of the edges \[m²\].
+    squared_lengths: Vec<f64>,
+    /// Corners opposite to each edge; of an edge of more than two triangles the last two.
+    beside: Vec<[Option<u32>; 2]>,
+    /// Vertices that no vertex counts as another layer of, itself included; sorted.
+    close: Vec<Vec<u32>>,
+    /// Vertices where layers go through each other.
+    tangled: Vec<bool>,
+    triangle_tree: BoxTree,
+    edge_tree: BoxTree,
+}
+
+/// What triangles beside an edge tell of it.
+#[derive(Default)]
+struct Side {
+    area: f64,
+    squared_length: f64,
+    beside: [Option<u32>; 2],
+}
+
+/// sin² of the angle below which edges count as ever more parallel: 6°.
+const PARALLEL: f64 = 1e-2;
+/// Vertices closer to another layer than this part of the thickness count as tangled with it.
+const STUCK: f64 = 1e-3;
+
+impl Layers {
+    /// Prepares to search `cloth` at positions `x` \[m\]. What goes through itself there is exempt.
+    pub fn new(cloth: &Cloth, params: LayerParams, x: &[Vec3]) -> Self {
+        let mut edges: BTreeMap<[u32; 2], Side> = BTreeMap::new();
+        for (t, triangle) in cloth.triangles.iter().enumerate() {
+            let rest = cloth.reference_corners(t);
+            let area = 0.5 * crate::geometry::cross2(rest[1] - rest[0], rest[2] - rest[0]).abs();
+            for i in 0..3 {
+                let j = (i + 1) % 3;
+                let ends = [triangle[i].min(triangle[j]), triangle[i].max(triangle[j])];
+                let entry = edges.entry(ends).or_default();
+                entry.area += area / 3.0;
+                entry.squared_length = (rest[j] - rest[i]).norm_squared();
+                entry.beside = [entry.beside[1], Some(triangle[3 - i - j])];
+            }
+        }
+        let kappa = |area: &f64| params.stiffness * area;
+        let mut layers = Self {
+            params,
+            triangles: cloth.triangles.clone(),
+            vertex_kappa: cloth.reference_area.iter().map(kappa).collect(),
+            edge_kappa: edges.values().map(|side| kappa(&side.area)).collect(),
+            squared_lengths: edges.values().map(|side| side.squared_length).collect(),
+            beside: edges.values().map(|side| side.beside).collect(),
+            edges: edges.into_keys().collect(),
+            close: close(cloth, 2.0 * params.thickness),
+            tangled: vec![false; cloth.vertex_count],
+            triangle_tree: BoxTree::new(&[]),
+            edge_tree: BoxTree::new(&[]),
+        };
+        if params.on {
+            let still = vec![Vec3::zeros(); x.len()];
+            layers.triangle_tree = BoxTree::new(&swept(&layers.triangles, x, &still, 0.0));
+            layers.edge_tree = BoxTree::new(&swept(&layers.edges, x, &still, 0.0));
+            layers.find_tangles(x);
+        }
+        layers
+    }
+
+    /// Distance at which layers begin to feel each other \[m\].
+    pub fn thickness(&self) -> f64 {
+        self.params.thickness
+    }
+
+    /// Whether layers go through each other anywhere.
+    pub fn tangled(&self) -> bool {
+        self.tangled.contains(&true)
+    }
+
+    /// Exempts what goes through itself at `x`, and its surroundings, and nothing else.
+    pub fn find_tangles(&mut self, x: &[Vec3]) {
+        self.tangled.fill(false);
+        if !self.params.on {
+            return;
+        }
+        let mut at = vec![false; x.len()];
+        for t in intersections::within(x, &self.triangles).as_flattened() {
+            for v in self.triangles[*t as usize] {
+                at[v as usize] = true;
+            }
+        }
+        let stuck = STUCK * self.params.thickness;
+        for pair in self.pairs_within(x, stuck) {
+            for v in pair.vertices {
+                at[v as usize] = true;
+            }
+        }
+        for triangle in &self.triangles {
+            if triangle.iter().any(|v| at[*v as usize]) {
+                for v in triangle {
+                    self.tangled[*v as usize] = true;
+                }
+            }
+        }
+    }
+
+    /// All pairs that come closer than the thickness while the cloth moves by `d` from `x`, in a
+    /// fixed order; `spare` more \[m\] for moves yet unknown.
+    pub fn pairs(&mut self, x: &[Vec3], d: &[Vec3], spare: f64) -> Vec<Pair> {
+        if !self.params.on {
+            return Vec::new();
+        }
+        // What all cloth does alike brings no pieces closer.
+        let mean = d.iter().sum::<Vec3>() / d.len() as f64;
+        let d: Vec<Vec3> = d.iter().map(|d| d - mean).collect();
+        let reach = self.params.thickness + spare;
+        let triangle_boxes = swept(&self.triangles, x, &d, reach);
+        self.triangle_tree.refit(&triangle_boxes);
+        let edge_boxes = swept(&self.edges, x, &d, 0.5 * reach);
+        self.edge_tree.refit(&edge_boxes);
+        let near = |pair: &Pair| {
+            let v = pair.vertices.map(|v| v as usize);
+            let relative = relative_move(pair.kind, v.map(|v| d[v]));
+            pair.closest(v.map(|v| x[v])).r.norm() < reach + relative
+        };
+        let mut pairs: Vec<Pair> = (0..x.len() as u32)
+            .into_par_iter()
+            .flat_map_iter(|v| {
+                let (from, to) = (x[v as usize], x[v as usize] + d[v as usize]);
+                let mut found = Vec::new();
+                self.triangle_tree
+                    .overlapping(&around(&[from, to], 0.0), |t| {
+                        found.extend(self.point_triangle(v, t).filter(near));
+                    });
+                found
+            })
+            .collect();
+        pairs.par_extend(
+            (0..self.edges.len() as u32)
+                .into_par_iter()
+                .flat_map_iter(|e| {
+                    let mut found = Vec::new();
+                    self.edge_tree.overlapping(&edge_boxes[e as usize], |f| {
+                        if e < f {
+                            found.extend(self.edge_edge(e, f).filter(near));
+                        }
+                    });
+                    found
+                }),
+        );
+        pairs
+    }
+
+    /// All pairs closer than `distance` \[m\] at `x`.
+    fn pairs_within(&mut self, x: &[Vec3], distance: f64) -> Vec<Pair> {
+        let still = vec![Vec3::zeros(); x.len()];
+        self.pairs(x, &still, distance - self.params.thickness)
+    }
+
+    /// Vertex `v` and triangle `t`, unless they are exempt.
+    fn point_triangle(&self, v: u32, t: u32) -> Option<Pair> {
+        let [a, b, c] = self.triangles[t as usize];
+        (!self.exempt(&[v], &[a, b, c])).then(|| Pair {
+            vertices: [v, a, b, c],
+            kind: Kind::PointTriangle,
+            kappa: self.vertex_kappa[v as usize],
+        })
+    }
+
+    /// Edges `e` and `f`, unless they are exempt.
+    fn edge_edge(&self, e: u32, f: u32) -> Option<Pair> {
+        let (e, f) = (e as usize, f as usize);
+        let ([a, b], [c, d]) = (self.edges[e], self.edges[f]);
+        (!self.exempt(&[a, b], &[c, d])).then(|| Pair {
+            vertices: [a, b, c, d],
+            kind: Kind::EdgeEdge(PARALLEL * self.squared_lengths[e] * self.squared_lengths[f]),
+            kappa: 0.5 * (self.edge_kappa[e] + self.edge_kappa[f]),
+        })
+    }
+
+    fn exempt(&self, first: &[u32], second: &[u32]) -> bool {
+        let close = |v: &u32| {
+            let close = &self.close[*v as usize];
+            second.iter().any(|w| close.contains(w))
+        };
+        let tangled = |side: &[u32]| side.iter().any(|v| self.tangled[*v as usize]);
+        first.iter().any(close) || tangled(first) && tangled(second)
+    }
+}
+
+/// Part of the way to the parting plane that a vertex may go.
+const SHARE: f64 = 0.9;
+/// Passes in which the parting planes may move along with the cloth.
+const MOVING_PASSES: usize = 3;
+
+/// Shortens the move `d` from `x` of single vertices, so that no layer passes through another.
+/// `pairs` are all that the move could bring together. Whether anything was shortened.
+///
+/// The parting planes move along with the mean of their pair, so that layers fall together. Where
+/// that does not work out, because a vertex is held back elsewhere, planes stand still in the end.
+pub fn hold_apart(pairs: &[Pair], x: &[Vec3], d: &mut [Vec3]) -> bool {
+    let mut any = false;
+    for pass in 0..=MOVING_PASSES {
+        let mut parts = vec![1.0_f64; d.len()];
+        let mut parted = true;
+        for pair in pairs {
+            let v = pair.vertices.map(|v| v as usize);
+            let at = v.map(|v| x[v]);
+            let Some(closest) = Some(pair.closest(at)).filter(|c| c.r.norm() > 0.0) else {
+                continue;
+            };
+            let n = closest.r.normalize();
+            let moves = v.map(|v| n.dot(&d[v]));
+            let plane = if pass < MOVING_PASSES {
+                0.25 * moves.iter().sum::<f64>()
+            } else {
+                0.0
+            };
+            let heights = at.map(|p| n.dot(&p));
+            let middle = middle(pair.kind, &closest.beta, &heights);
+            for k in 0..4 {
+                // Towards the plane is positive.
+                let sign = if first_side(pair.kind, k) { -1.0 } else { 1.0 };
+                let (room, approach) = ((middle - heights[k]) * sign, (moves[k] - plane) * sign);
+                if approach > SHARE * room {
+                    // The plane's own move is given; what is left of the room is the vertex's.
+                    let own = moves[k] * sign;
+                    let allowed = SHARE * room + plane * sign;
+                    // One that flees too slowly is passed by the plane: that takes a still one.
+                    let part = if own > 0.0 {
+                        (allowed / own).max(0.0)
+                    } else {
+                        1.0
+                    };
+                    parts[v[k]] = parts[v[k]].min(part);
+                    parted = false;
+                }
+            }
+        }
+        if parted {
+            break;
+        }
+        any = true;
+        for (d, part) in d.iter_mut().zip(parts) {
+            *d *= part;
+        }
+    }
+    any
+}
+
+/// Whether corner `k` of a pair belongs to its first piece.
+fn first_side(kind: Kind, k: usize) -> bool {
+    match kind {
+        Kind::PointTriangle => k == 0,
+        Kind::EdgeEdge(_) => k < 2,
+    }
+}
+
+/// Height half way between the closest points.
+fn middle(kind: Kind, beta: &[f64; 4], heights: &[f64; 4]) -> f64 {
+    let mean = |k: usize| {
+        let sign = if first_side(kind, k) { 0.5 } else { -0.5 };
+        sign * beta[k] * heights[k]
+    };
+    (0..4).map(mean).sum()
+}
+
+/// The most by which a point of one piece moves against a point of the other.
+fn relative_move(kind: Kind, d: [Vec3; 4]) -> f64 {
+    let mut most = 0.0_f64;
+    for k in (0..4).filter(|k| first_side(kind, *k)) {
+        for l in (0..4).filter(|l| !first_side(kind, *l)) {
+            most = most.max((d[k] - d[l]).norm_squared());
+        }
+    }
+    most.sqrt()
+}
+
+/// Boxes around the whole move of pieces with `N` corners, widened by `margin` \[m\].
+fn swept<const N: usize>(pieces: &[[u32; N]], x: &[Vec3], d: &[Vec3], margin: f64) -> Vec<Aabb> {
+    let of_vertex = |(p, d): (&Vec3, &Vec3)| around(&[*p, p + d], margin);
+    let vertices: Vec<Aabb> = x.iter().zip(d).map(of_vertex).collect();
+    let boxed = |piece: &[u32; N]| {
+        let mut hull = vertices[piece[0] as usize];
+        for v in &piece[1..] {
+            let [low, high] = &vertices[*v as usize];
+            hull = [hull[0].inf(low), hull[1].sup(high)];
+        }
+        hull
+    };
+    pieces.iter().map(boxed).collect()
+}
+
+/// For every vertex those within `limit` \[m\] along the mesh of the reference pattern, itself
+/// included; the two ends of a flat triangle's height count as joined.
+fn close(cloth: &Cloth, limit: f64) -> Vec<Vec<u32>> {
+    let mut joined: BTreeMap<u32, Vec<(u32, f64)>> = BTreeMap::new();
+    for (t, triangle) in cloth.triangles.iter().enumerate() {
+        let rest = cloth.reference_corners(t);
+        let doubled = crate::geometry::cross2(rest[1] - rest[0], rest[2] - rest[0]).abs();
+        for i in 0..3 {
+            for j in (0..3).filter(|j| *j != i) {
+                let third = 3 - i - j;
+                let length = (rest[j] - rest[i]).norm();
+                let height = doubled / (rest[third] - rest[j]).norm();
+                // Over a foot that lies on the opposite side, corner i is as near as its height.
+                let distance = length.min(height);
+                if distance < limit {
+                    joined
+                        .entry(triangle[i])
+                        .or_default()
+                        .push((triangle[j], distance));
+                    joined
+                        .entry(triangle[j])
+                        .or_default()
+                        .push((triangle[i], distance));
+                }
+            }
+        }
+    }
+    let around = |start: u32| {
+        let mut reached: BTreeMap<u32, f64> = BTreeMap::from([(start, 0.0)]);
+        let mut open = vec![start];
+        while let Some(v) = open.pop() {
+            let so_far = reached[&v];
+            for (w, length) in joined.get(&v).into_iter().flatten() {
+                let distance = so_far + length;
+                if distance < limit && reached.get(w).is_none_or(|d| distance < *d) {
+                    reached.insert(*w, distance);
+                    open.push(*w);
+                }
+            }
+        }
+        reached.into_keys().collect()
+    };
+    (0..cloth.vertex_count as u32).map(around).collect()
+}
+
+#[cfg(test)]
+mod tests;

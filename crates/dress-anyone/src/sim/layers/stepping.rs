@@ -1,0 +1,170 @@
+//! Layers in the time stepper: constraints n·Σ β_k x_k ≥ h along the normals before the step.
+//!
+//! Finding pairs costs about as much as a few sweeps, so they are found with room to spare, and
+//! found anew when the cloth has used up that room. Nothing moves farther than the room that is
+//! left, and what it could meet on the way is held apart, so layers that start apart stay apart.
+
+use super::{Layers, hold_apart};
+use crate::geometry::Vec3;
+use crate::sim::cloth::Cloth;
+use crate::sim::energy::layers::{LayerParams, Pair};
+
+/// Watches over the layers of a cloth that moves.
+#[derive(Clone, Debug)]
+pub struct Watch {
+    layers: Layers,
+    pairs: Vec<Pair>,
+    /// Positions for which the pairs were found \[m\].
+    from: Vec<Vec3>,
+    /// How far any vertex may go from there \[m\].
+    room: f64,
+    /// The farthest `room` that is ever given \[m\].
+    most: f64,
+    /// Steps until tangles are looked for again.
+    countdown: usize,
+}
+
+/// Two layers that may touch, or that shall part: Σ g·x ≥ gap, linearised once per step.
+#[derive(Clone, Copy, Debug)]
+pub struct Apart {
+    /// A vertex and a triangle or two edges; or an edge and the triangle it goes through.
+    vertices: [usize; 5],
+    /// g; the last one is zero where there are but four vertices.
+    gradient: [Vec3; 5],
+    gap: f64,
+    alpha_tilde: f64,
+    lambda: f64,
+}
+
+/// Room as part of the mean edge length: beyond, every piece would meet its neighbours' neighbours.
+const ROOM: f64 = 0.3;
+/// Room as part of the mean move of a step, so that pairs last for a few steps.
+const STEPS_OF_ROOM: f64 = 4.0;
+/// Steps between looks for tangles.
+const LOOK: usize = 10;
+/// Farthest that a step pushes tangled layers back, in thicknesses.
+const PUSH: f64 = 0.5;
+
+impl Watch {
+    /// Watches `cloth`, now at `x` \[m\].
+    pub fn new(cloth: &Cloth, params: LayerParams, x: &[Vec3]) -> Self {
+        let layers = Layers::new(cloth, params, x);
+        let lengths: f64 = layers.squared_lengths.iter().map(|l| l.sqrt()).sum();
+        Self {
+            most: (ROOM * lengths / layers.edges.len() as f64).max(params.thickness),
+            layers,
+            pairs: Vec::new(),
+            from: Vec::new(),
+            room: 0.0,
+            countdown: LOOK,
+        }
+    }
+
+    /// Whether layers went through each other when last looked at.
+    pub fn tangled(&self) -> bool {
+        self.layers.tangled()
+    }
+
+    /// Constraints for a step from `x` that wants to move by `wish` \[m\].
+    pub fn constraints(&mut self, x: &[Vec3], wish: &[Vec3], per_time: f64) -> Vec<Apart> {
+        if !self.layers.params.on {
+            return Vec::new();
+        }
+        self.countdown -= 1;
+        let look = self.countdown == 0;
+        if look {
+            self.countdown = LOOK;
+            self.layers.find_tangles(x);
+        }
+        let farthest = wish.iter().map(Vec3::norm).fold(0.0, f64::max);
+        if look || self.from.len() != x.len() || self.left(x) < farthest.min(0.25 * self.most) {
+            self.room = (STEPS_OF_ROOM * farthest).min(self.most);
+            let still = vec![Vec3::zeros(); x.len()];
+            self.pairs = self.layers.pairs(x, &still, 2.0 * self.room);
+            self.from = x.to_vec();
+        }
+        let h = self.layers.thickness();
+        let reach = h + 2.0 * farthest.min(self.room);
+        let apart = |pair: &Pair| {
+            let [a, b, c, d] = pair.vertices.map(|v| v as usize);
+            let closest = pair.closest([a, b, c, d].map(|v| x[v]));
+            let delta = closest.r.norm();
+            let [p, q, r, s] = closest.beta.map(|b| closest.r * (b / delta));
+            (0.0 < delta && delta < reach).then_some(Apart {
+                vertices: [a, b, c, d, d],
+                gradient: [p, q, r, s, Vec3::zeros()],
+                gap: h,
+                alpha_tilde: per_time / pair.kappa,
+                lambda: 0.0,
+            })
+        };
+        let mut all: Vec<Apart> = self.pairs.iter().filter_map(apart).collect();
+        if self.layers.tangled() {
+            all.extend(self.untangling(x));
+        }
+        all
+    }
+
+    /// Constraints that pull layers back which go through each other at `x`.
+    fn untangling(&self, x: &[Vec3]) -> impl Iterator<Item = Apart> {
+        let push = PUSH * self.layers.thickness();
+        self.layers.piercings(x).into_iter().filter_map(move |p| {
+            let direction = p.push.try_normalize(1e-6)?;
+            let gradient = p.weights.map(|w| direction * w);
+            let now: f64 = (0..5).map(|k| gradient[k].dot(&x[p.vertices[k]])).sum();
+            Some(Apart {
+                vertices: p.vertices,
+                gradient,
+                gap: now + push * p.push.norm(),
+                alpha_tilde: 0.0,
+                lambda: 0.0,
+            })
+        })
+    }
+
+    /// Pushes apart what is closer than the thickness; `w` are inverse masses \[1/kg\].
+    pub fn sweep(&self, apart: &mut [Apart], w: &[f64], x: &mut [Vec3]) {
+        for pair in apart {
+            let mut c = -pair.gap;
+            let mut inverse_mass = pair.alpha_tilde;
+            for (v, g) in pair.vertices.into_iter().zip(&pair.gradient) {
+                c += g.dot(&x[v]);
+                inverse_mass += w[v] * g.norm_squared();
+            }
+            let wanted = pair.lambda - (c + pair.alpha_tilde * pair.lambda) / inverse_mass;
+            let delta = wanted.max(0.0) - pair.lambda;
+            if delta == 0.0 {
+                continue;
+            }
+            pair.lambda += delta;
+            for (v, g) in pair.vertices.into_iter().zip(&pair.gradient) {
+                x[v] += g * (w[v] * delta);
+            }
+        }
+    }
+
+    /// Shortens the step from `before` to `x` so that no layer passes another.
+    pub fn restrain(&self, before: &[Vec3], x: &mut [Vec3]) {
+        if !self.layers.params.on {
+            return;
+        }
+        let left = self.left(before);
+        let mut moves: Vec<Vec3> = x.iter().zip(before).map(|(x, b)| x - b).collect();
+        for d in &mut moves {
+            let length = d.norm();
+            if length > left {
+                *d *= left / length;
+            }
+        }
+        hold_apart(&self.pairs, before, &mut moves);
+        for ((x, b), d) in x.iter_mut().zip(before).zip(moves) {
+            *x = b + d;
+        }
+    }
+
+    /// How far any vertex may still go \[m\].
+    fn left(&self, x: &[Vec3]) -> f64 {
+        let gone = x.iter().zip(&self.from).map(|(x, f)| (x - f).norm());
+        (self.room - gone.fold(0.0, f64::max)).max(0.0)
+    }
+}

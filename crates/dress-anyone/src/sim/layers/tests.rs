@@ -1,0 +1,121 @@
+use super::*;
+use crate::check::noise;
+use crate::garment::Fabric;
+use crate::sim::cloth::fixtures;
+
+const PARAMS: LayerParams = LayerParams {
+    on: true,
+    thickness: 4e-3,
+    stiffness: 1e6,
+};
+
+/// Two sheets of one cloth, `gap` \[m\] above each other, crumpled a little.
+fn two_sheets(gap: f64) -> (Cloth, Vec<Vec3>) {
+    let one = fixtures::sheet(6, 6, 0.02);
+    let count = one.x_bar.len() as u32;
+    let mut both = one.clone();
+    both.x_bar
+        .extend(one.x_bar.iter().map(|p| p.add_scalar(1.0)));
+    both.triangles
+        .extend(one.triangles.iter().map(|t| t.map(|v| v + count)));
+    both.sewing = (0..2 * count).collect();
+    both.cloth_vertex_count = 2 * count as usize;
+    let x = (0..2 * count as usize)
+        .map(|i| {
+            let p = one.x_bar[i % count as usize];
+            let up = if i < count as usize { 0.0 } else { gap };
+            Vec3::new(p.x, up, p.y) + Vec3::from_fn(|c, _| 1e-3 * noise(3 * i + c))
+        })
+        .collect();
+    (Cloth::new(&both, &Fabric::default()), x)
+}
+
+#[test]
+fn a_flat_sheet_does_not_touch_itself() {
+    let (cloth, x) = two_sheets(0.1);
+    let mut layers = Layers::new(&cloth, PARAMS, &x);
+    assert!(layers.pairs_within(&x, PARAMS.thickness).is_empty());
+}
+
+#[test]
+fn the_search_finds_what_a_look_at_all_pairs_finds() {
+    let (cloth, x) = two_sheets(5e-3);
+    let mut layers = Layers::new(&cloth, PARAMS, &x);
+    let d: Vec<Vec3> = (0..x.len())
+        .map(|i| Vec3::from_fn(|c, _| 2e-3 * noise(7 * i + c)))
+        .collect();
+    let found = layers.pairs(&x, &d, 0.0);
+    let ends: Vec<Vec3> = x.iter().zip(&d).map(|(x, d)| x + d).collect();
+    let touches = |pair: &Pair, x: &[Vec3]| {
+        pair.closest(pair.vertices.map(|v| x[v as usize])).r.norm() < PARAMS.thickness
+    };
+    let (vertices, triangles) = (x.len() as u32, layers.triangles.len() as u32);
+    let edges = layers.edges.len() as u32;
+    let points = (0..vertices).flat_map(|v| (0..triangles).map(move |t| (v, t)));
+    let all_points = points.filter_map(|(v, t)| layers.point_triangle(v, t));
+    let crossings = (0..edges).flat_map(|e| (e + 1..edges).map(move |f| (e, f)));
+    let all_edges = crossings.filter_map(|(e, f)| layers.edge_edge(e, f));
+    let mut counted = 0;
+    for pair in all_points.chain(all_edges) {
+        if touches(&pair, &x) || touches(&pair, &ends) {
+            counted += 1;
+            assert!(found.contains(&pair), "{pair:?}");
+        }
+    }
+    assert!(counted > 50, "the sheets must touch: {counted}");
+}
+
+#[test]
+fn no_move_takes_one_layer_through_another() {
+    let (cloth, start) = two_sheets(5e-3);
+    for seed in 0..20 {
+        let mut x = start.clone();
+        let mut layers = Layers::new(&cloth, PARAMS, &x);
+        let count = x.len() / 2;
+        for step in 0..10 {
+            // The upper sheet falls by more than the gap; all is shaken and drifts aside.
+            let mut d: Vec<Vec3> = (0..x.len())
+                .map(|i| {
+                    let shake = Vec3::from_fn(|c, _| 3e-3 * noise(seed * 91 + 7 * i + c + step));
+                    let fall = if i < count { 0.0 } else { -4e-3 };
+                    shake + Vec3::new(0.02, fall, 0.0)
+                })
+                .collect();
+            let pairs = layers.pairs(&x, &d, 0.0);
+            let stopped = hold_apart(&pairs, &x, &mut d);
+            assert!(stopped, "the fall must be stopped");
+            for (x, d) in x.iter_mut().zip(&d) {
+                *x += d;
+            }
+            let through = intersections::within(&x, &cloth.triangles);
+            assert!(through.is_empty(), "seed {seed}, step {step}: {through:?}");
+        }
+    }
+}
+
+#[test]
+fn layers_that_fall_together_are_not_held_back() {
+    let (cloth, x) = two_sheets(5e-3);
+    let mut layers = Layers::new(&cloth, PARAMS, &x);
+    let fall = Vec3::new(0.01, -0.05, 0.0);
+    let mut d = vec![fall; x.len()];
+    let pairs = layers.pairs(&x, &d, 0.0);
+    assert!(!pairs.is_empty());
+    assert!(!hold_apart(&pairs, &x, &mut d));
+    assert!(d.iter().all(|d| *d == fall));
+}
+
+#[test]
+fn what_goes_through_itself_is_exempt_and_the_rest_is_not() {
+    let (cloth, mut x) = two_sheets(3e-3);
+    let count = x.len() / 2;
+    // One corner vertex of the upper sheet pulled down through the lower one.
+    x[count].y -= 0.02;
+    let mut layers = Layers::new(&cloth, PARAMS, &x);
+    assert!(layers.tangled());
+    let pairs = layers.pairs_within(&x, PARAMS.thickness);
+    assert!(!pairs.is_empty());
+    for pair in pairs {
+        assert!(!pair.vertices.contains(&(count as u32)), "{pair:?}");
+    }
+}
