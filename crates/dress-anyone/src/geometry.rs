@@ -6,6 +6,7 @@ pub mod groups;
 pub mod mesh;
 pub mod polygon;
 pub mod quality;
+pub mod sparse;
 pub mod watertight;
 
 use nalgebra::SVector;

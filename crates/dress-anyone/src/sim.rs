@@ -10,7 +10,6 @@ pub mod cloth;
 pub mod drape;
 pub mod energy;
 pub mod equilibrium;
-pub mod sparse;
 pub mod step;
 pub mod system;
 pub use cloth::{Cloth, Hold, Rest};

@@ -46,6 +46,8 @@ pub enum View {
     Back,
     /// In front, 40° to the wearer's left.
     ThreeQuarter,
+    /// At the wearer's left.
+    Side,
 }
 
 impl View {
@@ -55,6 +57,7 @@ impl View {
             Self::Front => 0.0,
             Self::Back => std::f64::consts::PI,
             Self::ThreeQuarter => 40_f64.to_radians(),
+            Self::Side => std::f64::consts::FRAC_PI_2,
         }
     }
 
@@ -63,6 +66,7 @@ impl View {
             Self::Front => "front",
             Self::Back => "back",
             Self::ThreeQuarter => "three-quarter",
+            Self::Side => "side",
         }
     }
 }

@@ -5,9 +5,9 @@ use super::adjoint;
 use super::cloth::{Cloth, Rest};
 use super::energy::contact::{ContactParams, Surface};
 use super::equilibrium::{self, EquilibriumParams, RestStatus};
-use super::sparse::Factor;
 use super::step::{State, StepParams, Stepper};
 use super::system::{Assembly, System};
+use crate::geometry::sparse::Factor;
 use crate::geometry::{Vec2, Vec3};
 use serde::{Deserialize, Serialize};
 

@@ -6,9 +6,9 @@
 //! the path cannot end on a saddle that the exact stiffness shows.
 
 use super::energy::contact::Surface;
-use super::sparse::Factor;
 use super::system::System;
 use crate::geometry::Vec3;
+use crate::geometry::sparse::Factor;
 use serde::{Deserialize, Serialize};
 
 /// How to look for equilibrium.

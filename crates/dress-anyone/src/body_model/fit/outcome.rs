@@ -1,0 +1,138 @@
+//! How far the fitted surface and the scan are from each other, part by part, and when that is too
+//! far for the scan to be a body.
+
+use super::super::Part;
+use super::scan::{Scan, spread};
+use crate::geometry::{ClosestPoint, TriangleMesh};
+use crate::problem::Problem;
+use rayon::prelude::*;
+use serde::Serialize;
+
+/// Distances between a fitted surface and a scan.
+#[derive(Clone, Debug, Serialize)]
+pub struct Distances {
+    /// From the scan to the fitted surface, where garments are worn.
+    pub scan_to_fit: Figures,
+    /// From the fitted surface to the scan, where garments are worn and the scan has no hole.
+    pub fit_to_scan: Figures,
+    /// From the scan to the fitted surface everywhere: hands, feet and head too.
+    pub whole_scan_to_fit: Figures,
+    /// By part of the body, worst first: from the fitted surface to the scan.
+    pub parts: Vec<PartFigures>,
+}
+
+/// Distances \[m\] in a few numbers.
+#[derive(Clone, Copy, Debug, Default, Serialize)]
+pub struct Figures {
+    /// How many were measured.
+    pub count: usize,
+    /// Their mean.
+    pub mean: f64,
+    /// Half are below this.
+    pub median: f64,
+    /// 95 % are below this.
+    pub p95: f64,
+    /// The largest.
+    pub max: f64,
+}
+
+/// Distances of one part.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct PartFigures {
+    /// The part.
+    pub part: Part,
+    /// Its distances.
+    #[serde(flatten)]
+    pub figures: Figures,
+}
+
+impl Figures {
+    fn of(mut distances: Vec<f64>) -> Self {
+        distances.sort_by(f64::total_cmp);
+        let Some(max) = distances.last().copied() else {
+            return Self::default();
+        };
+        let count = distances.len();
+        let rank = |share: f64| distances[((share * count as f64) as usize).min(count - 1)];
+        Self {
+            count,
+            mean: distances.iter().sum::<f64>() / count as f64,
+            median: rank(0.5),
+            p95: rank(0.95),
+            max,
+        }
+    }
+}
+
+/// Points of the fitted surface from which distances are measured.
+const POINTS: usize = 16_000;
+
+/// Distances between `body`, whose vertices belong to `parts`, and `scan`.
+pub(super) fn distances(body: &TriangleMesh, parts: &[Part], scan: &Scan) -> Distances {
+    let surface = ClosestPoint::new(body);
+    let part_of = |t: usize| parts[body.triangles[t][0] as usize];
+    let to_fit: Vec<(Part, f64)> = scan
+        .samples
+        .par_iter()
+        .filter_map(|sample| {
+            let foot = surface.query(sample.point, f64::INFINITY)?;
+            Some((part_of(foot.triangle as usize), foot.distance))
+        })
+        .collect();
+    let to_scan: Vec<(Part, f64)> = spread(body, POINTS)
+        .par_iter()
+        .filter_map(|(t, weights)| {
+            let p = super::scan::blend(&body.positions, body.triangles[*t], *weights);
+            let (aim, rim) = scan.closest(p, f64::INFINITY)?;
+            (!rim).then(|| (part_of(*t), (p - aim.point).norm()))
+        })
+        .collect();
+    let clothed = |pairs: &[(Part, f64)]| {
+        let worn = pairs.iter().filter(|(part, _)| part.is_clothed());
+        Figures::of(worn.map(|(_, d)| *d).collect())
+    };
+    let of_part = |part: Part| {
+        let own = to_scan.iter().filter(|(p, _)| *p == part);
+        let figures = Figures::of(own.map(|(_, d)| *d).collect());
+        PartFigures { part, figures }
+    };
+    let mut by_part: Vec<PartFigures> = Part::ALL.map(of_part).to_vec();
+    by_part.sort_by(|a, b| b.figures.mean.total_cmp(&a.figures.mean));
+    Distances {
+        scan_to_fit: clothed(&to_fit),
+        fit_to_scan: clothed(&to_scan),
+        whole_scan_to_fit: Figures::of(to_fit.iter().map(|(_, d)| *d).collect()),
+        parts: by_part,
+    }
+}
+
+/// Refuses a mesh to which the model comes no closer than `most` \[m\] on average at some clothed
+/// part, or that has as much surface again far from the model.
+pub(super) fn refuse_strangers(distances: &Distances, most: f64) -> Result<(), Vec<Problem>> {
+    let far = |p: &&PartFigures| p.part.is_clothed() && p.figures.mean > most;
+    let mut problems: Vec<Problem> = distances
+        .parts
+        .iter()
+        .filter(far)
+        .map(|p| {
+            Problem::whole(format!(
+                "no body was recognised in this mesh: {} of the body model stays {:.0} mm from it \
+                 on average; it should be one body, standing, near an A- or T-pose",
+                p.part.in_words(),
+                1e3 * p.figures.mean
+            ))
+        })
+        .collect();
+    if distances.whole_scan_to_fit.mean > most {
+        problems.push(Problem::whole(format!(
+            "no body was recognised in this mesh: its surface is {:.0} mm from the body model on \
+             average; remove what is not the body (stand, hair, wide clothes)",
+            1e3 * distances.whole_scan_to_fit.mean
+        )));
+    }
+    if problems.is_empty() {
+        Ok(())
+    } else {
+        Err(problems)
+    }
+}
