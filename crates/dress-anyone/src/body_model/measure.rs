@@ -1,11 +1,12 @@
-//! A tailor's measurements of a fitted body, in the canonical A-pose.
+//! A tailor's measurements of a fitted body, standing upright: ankles below the hip joints, arms half
+//! down. Legs astride would widen the hip by two centimetres and cost one of height.
 //!
 //! Girths are those of a tape held tight: the convex hull of a plane section through the parts of
 //! the body that are meant, so arms do not count to the bust. Which plane or path is in the table of
 //! [`measure`], and with every result.
 
 use super::skeleton::{ANKLES, ELBOWS, HEAD, HIPS, KNEES, NECK, SHOULDERS, WRISTS};
-use super::{BodyModel, Part, Shape};
+use super::{BodyModel, Part, Pose, Shape};
 use crate::geometry::{TriangleMesh, Vec2, Vec3, bounds, cross2};
 use serde::Serialize;
 
@@ -25,7 +26,7 @@ const PLANES: usize = 25;
 
 /// The measurements of a shape with offsets.
 pub fn measure(model: &BodyModel, shape: &Shape, offsets: &[Vec3]) -> Vec<Measurement> {
-    let posed = model.a_pose(shape, offsets);
+    let posed = model.posed(shape, &upright(model, shape), offsets);
     let body = Standing {
         mesh: TriangleMesh {
             positions: posed.positions.clone(),
@@ -45,15 +46,16 @@ pub fn measure(model: &BodyModel, shape: &Shape, offsets: &[Vec3]) -> Vec<Measur
     };
 
     let (chest, armpits) = (joint(SPINE3).y, joint(SHOULDERS[0]).y);
-    let (bust_line, bust) = largest(between(chest, chest + 0.75 * (armpits - chest)), |y| {
-        girth_at(y, &trunk)
-    });
+    let bust_line = body.foremost(
+        chest + 0.4 * (armpits - chest),
+        chest + 0.6 * (armpits - chest),
+    );
     let (_, waist) = smallest(between(joint(SPINE1).y + 0.02, chest + 0.02), |y| {
         girth_at(y, &trunk)
     });
     let hip_joint = joint(HIPS[0]).y;
     let lower = [Part::Trunk, Part::LeftLeg, Part::RightLeg];
-    let (_, hip) = largest(between(0.9 * hip_joint, 1.05 * hip_joint), |y| {
+    let (_, hip) = largest(between(0.94 * hip_joint, 1.05 * hip_joint), |y| {
         girth_at(y, &lower)
     });
     let crotch = body.crotch(0.5 * (joint(HIPS[0]).x + joint(HIPS[1]).x));
@@ -72,8 +74,8 @@ pub fn measure(model: &BodyModel, shape: &Shape, offsets: &[Vec3]) -> Vec<Measur
         ("height", height, "sole to crown"),
         (
             "bust",
-            bust,
-            "largest level girth of the trunk between chest and armpits",
+            girth_at(bust_line, &trunk),
+            "level girth of the trunk through the foremost point of the chest",
         ),
         (
             "underbust",
@@ -129,6 +131,19 @@ const SPINE3: usize = 9;
 /// The underbust lies this share of the height below the bust.
 const BELOW_BUST: f64 = 0.045;
 
+/// The canonical A-pose with the legs turned sideways until they are vertical.
+fn upright(model: &BodyModel, shape: &Shape) -> Pose {
+    let mut pose = model.arms_at(std::f64::consts::FRAC_PI_4);
+    let joints = model.joints(shape);
+    for side in 0..2 {
+        let leg = joints[ANKLES[side]] - joints[HIPS[side]];
+        let turn = Vec3::new(0.0, 0.0, -leg.x.atan2(-leg.y));
+        pose.rotations[HIPS[side]] = turn;
+        pose.rotations[ANKLES[side]] = -turn;
+    }
+    pose
+}
+
 /// Where `value` is largest among `places`, and what it is there.
 fn largest(places: impl Iterator<Item = f64>, value: impl Fn(f64) -> f64) -> (f64, f64) {
     let pairs = places.map(|place| (place, value(place)));
@@ -173,6 +188,15 @@ impl Standing {
                 .map(|p| Vec2::new(u.dot(p), v.dot(p)))
                 .collect(),
         )
+    }
+
+    /// Height of the trunk's foremost vertex between two heights; their middle when there is none.
+    fn foremost(&self, from: f64, to: f64) -> f64 {
+        let trunk = |(_, part): &(&Vec3, &Part)| **part == Part::Trunk;
+        let vertices = self.mesh.positions.iter().zip(&self.parts).filter(trunk);
+        let between = vertices.filter(|(p, _)| (from..to).contains(&p.y));
+        let foremost = between.max_by(|(a, _), (b, _)| a.z.total_cmp(&b.z));
+        foremost.map_or(0.5 * (from + to), |(p, _)| p.y)
     }
 
     /// Height of the lowest point of the body in its middle plane.
