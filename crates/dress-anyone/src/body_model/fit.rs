@@ -37,6 +37,8 @@ pub struct Fit {
     pub mesh: TriangleMesh,
     /// The same without offsets: shape, stretch and pose alone \[m\].
     pub plain: TriangleMesh,
+    /// What it was fitted to: the mesh without small components, thinned out where it was too fine.
+    pub skin: TriangleMesh,
     /// How well it fits.
     pub report: FitReport,
 }
@@ -151,6 +153,7 @@ pub fn fit(model: &BodyModel, mesh: &TriangleMesh) -> Result<Fit, Vec<Problem>> 
         offsets,
         mesh,
         plain,
+        skin: scan.mesh,
         report: FitReport {
             without_offsets,
             distances,

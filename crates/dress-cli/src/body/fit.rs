@@ -68,7 +68,7 @@ pub fn run(arguments: &FitArguments) -> Result<String, Failure> {
 
 /// The scan, shape and pose alone, the fitted surface, and that in the A-pose.
 fn picture(model: &BodyModel, body: &Body, fit: &Fit, posed: &TriangleMesh) -> Vec<u8> {
-    let scan = ClosestPoint::new(&body.mesh);
+    let scan = ClosestPoint::new(&fit.skin);
     let distances = |mesh: &TriangleMesh| -> Vec<f64> {
         let distance = |p| {
             scan.query(p, f64::INFINITY)
@@ -80,7 +80,7 @@ fn picture(model: &BodyModel, body: &Body, fit: &Fit, posed: &TriangleMesh) -> V
     let parts = vec![0; model.parts().template.triangles.len()];
     let nobody = TriangleMesh::default();
     let figures = [
-        bare("as read", &body.mesh),
+        bare("what was fitted", &fit.skin),
         coloured("shape and pose alone", &fit.plain, &plain, &nobody, &parts),
         coloured("fitted", &fit.mesh, &fitted, &nobody, &parts),
         bare("fitted, in the A-pose", posed),

@@ -2,7 +2,7 @@
 //! far for the scan to be a body.
 
 use super::super::Part;
-use super::scan::{Scan, spread};
+use super::scan::{Scan, blend, spread};
 use crate::geometry::{ClosestPoint, TriangleMesh};
 use crate::problem::Problem;
 use rayon::prelude::*;
@@ -64,25 +64,26 @@ impl Figures {
     }
 }
 
-/// Points of the fitted surface from which distances are measured.
-const POINTS: usize = 16_000;
+/// Points of each surface from which distances are measured. Not the number of [`Scan::samples`]: so
+/// they are other points than those that were fitted.
+const POINTS: usize = 21_000;
 
 /// Distances between `body`, whose vertices belong to `parts`, and `scan`.
 pub(super) fn distances(body: &TriangleMesh, parts: &[Part], scan: &Scan) -> Distances {
     let surface = ClosestPoint::new(body);
     let part_of = |t: usize| parts[body.triangles[t][0] as usize];
-    let to_fit: Vec<(Part, f64)> = scan
-        .samples
+    let to_fit: Vec<(Part, f64)> = spread(&scan.mesh, POINTS)
         .par_iter()
-        .filter_map(|sample| {
-            let foot = surface.query(sample.point, f64::INFINITY)?;
+        .filter_map(|(t, weights)| {
+            let p = blend(&scan.mesh.positions, scan.mesh.triangles[*t], *weights);
+            let foot = surface.query(p, f64::INFINITY)?;
             Some((part_of(foot.triangle as usize), foot.distance))
         })
         .collect();
     let to_scan: Vec<(Part, f64)> = spread(body, POINTS)
         .par_iter()
         .filter_map(|(t, weights)| {
-            let p = super::scan::blend(&body.positions, body.triangles[*t], *weights);
+            let p = blend(&body.positions, body.triangles[*t], *weights);
             let (aim, rim) = scan.closest(p, f64::INFINITY)?;
             (!rim).then(|| (part_of(*t), (p - aim.point).norm()))
         })
