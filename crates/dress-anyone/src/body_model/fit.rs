@@ -17,6 +17,7 @@ use super::measure::{Measurement, measure};
 use super::{BodyModel, Part, Pose, Posed, Shape};
 use crate::geometry::{TriangleMesh, Vec3};
 use crate::problem::Problem;
+use outcome::Limits;
 pub use outcome::{Distances, Figures, PartFigures};
 use rayon::prelude::*;
 use scan::Scan;
@@ -186,10 +187,16 @@ fn pose_and_build(model: &BodyModel, scan: &Scan) -> State {
 const COARSE_ROUNDS: usize = 3;
 const CELL: f64 = 0.04;
 
-/// Mean distance \[m\] of a clothed part beyond which the mesh is refused: before the offsets, and
-/// with them.
-const ROUGHLY: f64 = 0.05;
-const CLOSELY: f64 = 0.015;
+/// Distances beyond which the mesh is refused: before the offsets, and with them. Offsets would wrap a body around any box; shape and stretch come within 3 mm of every
+/// body tried, goblins too.
+const ROUGHLY: Limits = Limits {
+    part: 0.02,
+    most: 0.025,
+};
+const CLOSELY: Limits = Limits {
+    part: 0.015,
+    most: 0.012,
+};
 
 /// Offsets at rest that bring the vertices of `posed` to `positions`.
 fn at_rest(model: &BodyModel, posed: &Posed, positions: &[Vec3]) -> Vec<Vec3> {

@@ -107,10 +107,18 @@ pub(super) fn distances(body: &TriangleMesh, parts: &[Part], scan: &Scan) -> Dis
     }
 }
 
-/// Refuses a mesh to which the model comes no closer than `most` \[m\] on average at some clothed
-/// part, or that has as much surface again far from the model.
-pub(super) fn refuse_strangers(distances: &Distances, most: f64) -> Result<(), Vec<Problem>> {
-    let far = |p: &&PartFigures| p.part.is_clothed() && p.figures.mean > most;
+/// How far a body may be from the model.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Limits {
+    /// Mean distance of a clothed part, or of the whole mesh \[m\].
+    pub(super) part: f64,
+    /// Distance that 95 % of what is clothed may have, either way \[m\].
+    pub(super) most: f64,
+}
+
+/// Refuses a mesh that is farther from the model than the limits, and tells where.
+pub(super) fn refuse_strangers(distances: &Distances, limits: Limits) -> Result<(), Vec<Problem>> {
+    let far = |p: &&PartFigures| p.part.is_clothed() && p.figures.mean > limits.part;
     let mut problems: Vec<Problem> = distances
         .parts
         .iter()
@@ -124,7 +132,17 @@ pub(super) fn refuse_strangers(distances: &Distances, most: f64) -> Result<(), V
             ))
         })
         .collect();
-    if distances.whole_scan_to_fit.mean > most {
+    let p95 = distances.scan_to_fit.p95.max(distances.fit_to_scan.p95);
+    if problems.is_empty() && p95 > limits.most {
+        let clothed = distances.parts.iter().find(|p| p.part.is_clothed());
+        problems.push(Problem::whole(format!(
+            "no body was recognised in this mesh: a twentieth of the body model stays more than \
+             {:.0} mm away, most of all {}; it should be one body, standing, near an A- or T-pose",
+            1e3 * p95,
+            clothed.map_or("", |p| p.part.in_words())
+        )));
+    }
+    if distances.whole_scan_to_fit.mean > limits.part {
         problems.push(Problem::whole(format!(
             "no body was recognised in this mesh: its surface is {:.0} mm from the body model on \
              average; remove what is not the body (stand, hair, wide clothes)",
