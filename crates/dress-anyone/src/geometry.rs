@@ -8,6 +8,7 @@ pub mod intersections;
 pub mod mesh;
 pub mod polygon;
 pub mod quality;
+pub mod sparse;
 pub mod watertight;
 
 use nalgebra::SVector;

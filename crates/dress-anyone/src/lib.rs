@@ -11,6 +11,7 @@
 //! | [`geometry`] | – | meshes, distances, quality |
 //! | [`pattern`] | – | panels, seams, the meshed rest shape |
 //! | [`body`] | §4.1 | bodies, and their distance field |
+//! | [`body_model`] | §4.1 | a statistical body, fitted to any mesh |
 //! | [`garment`] | – | pattern + sewing + fabric + drape |
 //! | [`transfer`] | §4.2 | the target shape x* |
 //! | [`cage`] | §4.3, §4.5 | control points ζ ↦ rest shape x̄, symmetric |
@@ -40,6 +41,7 @@ mod check;
 mod fixture;
 
 pub mod body;
+pub mod body_model;
 pub mod cage;
 pub mod descent;
 pub mod garment;

@@ -11,7 +11,6 @@ pub mod drape;
 pub mod energy;
 pub mod equilibrium;
 pub mod layers;
-pub mod sparse;
 pub mod step;
 pub mod system;
 pub use cloth::{Cloth, Hold, Rest};

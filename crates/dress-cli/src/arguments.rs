@@ -1,5 +1,6 @@
 //! The command line.
 
+use crate::body::arguments::{BodyCommand, ModelArguments};
 use crate::params::{self, Params};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use dress_anyone::body::UpAxis;
@@ -31,6 +32,9 @@ pub enum Command {
     Drape(DrapeArguments),
     /// Tell what is in a garment or body file, and what is wrong with it.
     Inspect(InspectArguments),
+    /// Draw, show, pose, measure and fit bodies.
+    #[command(subcommand)]
+    Body(BodyCommand),
     /// Print all parameters with their defaults and what they do, as TOML.
     Params,
 }
@@ -45,7 +49,7 @@ pub struct RefitArguments {
     /// The body that the garment fits (OBJ, PLY, STL) [default: built in]
     #[arg(long, value_name = "FILE", requires = "target_body")]
     pub source_body: Option<PathBuf>,
-    /// The body that it shall fit, vertex by vertex the same mesh [default: built in]
+    /// The body that it shall fit, of any mesh and pose [default: built in]
     #[arg(long, value_name = "FILE")]
     pub target_body: Option<PathBuf>,
     /// Folder for the results
@@ -57,6 +61,12 @@ pub struct RefitArguments {
     /// Let mirrored panels become unlike each other
     #[arg(long)]
     pub no_symmetry: bool,
+    /// Pose of the result: the source body's, or the target body's own besides
+    #[arg(long, value_name = "POSE", default_value = "source")]
+    pub pose: PoseChoice,
+    /// The model by which bodies of different meshes or poses are made to correspond.
+    #[command(flatten)]
+    pub model: ModelArguments,
     /// How to read the files.
     #[command(flatten)]
     pub reading: ReadingArguments,
@@ -157,6 +167,15 @@ pub enum Kind {
     Body,
 }
 
+/// Poses of a result.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum PoseChoice {
+    /// That of the source body
+    Source,
+    /// That, and the target body's own
+    Own,
+}
+
 /// [`CageKind`].
 #[derive(Clone, Copy, Debug, ValueEnum)]
 pub enum Cage {
@@ -209,7 +228,8 @@ pub enum Up {
 }
 
 impl Unit {
-    fn metres(self) -> f64 {
+    /// Metres in one.
+    pub fn metres(self) -> f64 {
         match self {
             Self::M => 1.0,
             Self::Dm => 0.1,
@@ -221,7 +241,8 @@ impl Unit {
 }
 
 impl Up {
-    fn axis(self) -> UpAxis {
+    /// As the library calls it.
+    pub fn axis(self) -> UpAxis {
         match self {
             Self::Y => UpAxis::Y,
             Self::Z => UpAxis::Z,

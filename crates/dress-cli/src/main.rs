@@ -9,6 +9,8 @@
 )]
 
 mod arguments;
+mod body;
+mod correspond;
 mod drape;
 mod failure;
 mod inputs;
@@ -58,6 +60,7 @@ fn run(command: &Command) -> Result<String, Failure> {
             set_threads(&arguments.running)?;
             drape::run(arguments)
         }
+        Command::Body(command) => body::run(command),
         Command::Inspect(arguments) => inspect::run(arguments),
         Command::Params => Ok(params::TEMPLATE.to_owned()),
     }

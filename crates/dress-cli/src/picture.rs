@@ -46,6 +46,8 @@ pub enum View {
     Back,
     /// In front, 40° to the wearer's left.
     ThreeQuarter,
+    /// At the wearer's left.
+    Side,
 }
 
 impl View {
@@ -55,6 +57,7 @@ impl View {
             Self::Front => 0.0,
             Self::Back => std::f64::consts::PI,
             Self::ThreeQuarter => 40_f64.to_radians(),
+            Self::Side => std::f64::consts::FRAC_PI_2,
         }
     }
 
@@ -63,6 +66,7 @@ impl View {
             Self::Front => "front",
             Self::Back => "back",
             Self::ThreeQuarter => "three-quarter",
+            Self::Side => "side",
         }
     }
 }
@@ -140,7 +144,9 @@ pub fn preview(title: &str, figures: &[Figure], views: &[View]) -> Vec<u8> {
     }
     let from_bottom = MARGIN + LEGEND_BAND - 20;
     let at = [MARGIN as f32 + 4.0, (canvas.height - from_bottom) as f32];
-    legend(&mut canvas, at, top_scale);
+    let dressed =
+        |figure: &Figure| !figure.cloth_triangles.is_empty() && !figure.body.triangles.is_empty();
+    legend(&mut canvas, at, top_scale, figures.iter().any(dressed));
     canvas.to_png()
 }
 
@@ -205,8 +211,8 @@ fn quantile(sorted: &[f64], share: f64) -> f64 {
     sorted.get(rank).copied().unwrap_or(0.0)
 }
 
-/// The colour scale, if any, and what wrong sides look like.
-fn legend(canvas: &mut Canvas, [left, top]: [f32; 2], top_scale: Option<f64>) {
+/// The colour scale, if any, and, where bodies wear something, what wrong sides look like.
+fn legend(canvas: &mut Canvas, [left, top]: [f32; 2], top_scale: Option<f64>, dressed: bool) {
     const WIDTH: f32 = 300.0;
     const LABEL: f32 = 150.0;
     let shift = if top_scale.is_some() {
@@ -214,13 +220,10 @@ fn legend(canvas: &mut Canvas, [left, top]: [f32; 2], top_scale: Option<f64>) {
     } else {
         0.0
     };
-    let swatch_at = [left + shift, top];
-    swatch(
-        canvas,
-        swatch_at,
-        colour::WRONG_SIDE,
-        "wrong side of the cloth",
-    );
+    if dressed {
+        let meaning = "wrong side of the cloth";
+        swatch(canvas, [left + shift, top], colour::WRONG_SIDE, meaning);
+    }
     if let Some(top_scale) = top_scale {
         scale_bar(canvas, [left, top], WIDTH, top_scale);
     }

@@ -1,6 +1,7 @@
 //! `dress refit`.
 
-use crate::arguments::RefitArguments;
+use crate::arguments::{PoseChoice, RefitArguments};
+use crate::correspond::{How, correspond};
 use crate::failure::Failure;
 use crate::inputs::{AVERAGE, Gathering, HEAVY, Input, InputReport, TSHIRT};
 use crate::params::Params;
@@ -16,9 +17,10 @@ use dress_anyone::io::garment::Loaded;
 use dress_anyone::io::output::{Output, check_writable};
 use dress_anyone::io::{body, garment_obj, garmentcode, obj, svg};
 use dress_anyone::problem::BadInput;
-use dress_anyone::refit::{Refit, RefitError, refit};
+use dress_anyone::refit::dress::drape_on;
+use dress_anyone::refit::{Refit, RefitError, accept, refit};
 use dress_anyone::report::Report;
-use dress_anyone::transfer::TransferError;
+use dress_anyone::transfer::target_shape;
 use serde::Serialize;
 use std::path::Path;
 use std::sync::atomic::Ordering;
@@ -30,16 +32,16 @@ struct Inputs<'a> {
     loaded: Loaded,
     source: Body,
     target: Body,
+    /// The target in its own pose, and how the bodies came to correspond.
+    target_own: TriangleMesh,
+    how: How,
 }
 
 /// Refits; what to say about it in the end.
 pub fn run(arguments: &RefitArguments) -> Result<String, Failure> {
-    let inputs = read(arguments)?;
-    let stop = stop_on_ctrl_c().context("Ctrl-C cannot be listened to")?;
     let mut progress = Progress::new(arguments.running.quiet);
-    progress.notes(&inputs.loaded.garment.name, &inputs.loaded.notes);
-    progress.notes(&inputs.source.name, &inputs.source.notes);
-    progress.notes(&inputs.target.name, &inputs.target.notes);
+    let inputs = read(arguments, &mut progress)?;
+    let stop = stop_on_ctrl_c().context("Ctrl-C cannot be listened to")?;
     let refitted = refit(
         &inputs.loaded.garment,
         &inputs.source,
@@ -65,7 +67,7 @@ pub fn run(arguments: &RefitArguments) -> Result<String, Failure> {
 }
 
 /// Reads all inputs before complaining of any.
-fn read(arguments: &RefitArguments) -> Result<Inputs<'_>, Failure> {
+fn read<'a>(arguments: &'a RefitArguments, progress: &mut Progress) -> Result<Inputs<'a>, Failure> {
     let names = [
         Input::or(arguments.garment.as_ref(), TSHIRT),
         Input::or(arguments.source_body.as_ref(), AVERAGE),
@@ -83,21 +85,20 @@ fn read(arguments: &RefitArguments) -> Result<Inputs<'_>, Failure> {
     gathering.finish()?;
     let all = params.zip(loaded).zip(source.zip(target));
     let ((params, loaded), (source, target)) = all.expect("nothing was wrong with any of them");
-    if !source.shares_topology(&target) {
-        // The transfer would say so too, but only after the first drape.
-        let [source_body, target_body] = [source.name, target.name];
-        return Err(RefitError::from(TransferError::DifferentTopology {
-            source_body,
-            target_body,
-        })
-        .into());
-    }
+    progress.notes(&loaded.garment.name, &loaded.notes);
+    progress.notes(&source.name, &source.notes);
+    progress.notes(&target.name, &target.notes);
+    let files = [names[1], names[2]].map(|name| name.name());
+    let files = [Path::new(&files[0]), Path::new(&files[1])];
+    let alike = correspond(arguments, files, source, target, progress)?;
     Ok(Inputs {
         names,
         params,
         loaded,
-        source,
-        target,
+        source: alike.source,
+        target: alike.target,
+        target_own: alike.target_own,
+        how: alike.how,
     })
 }
 
@@ -133,6 +134,12 @@ fn results(
     output.add("target.obj", shape("target shape of", &refitted.x_star));
     output.add("initial.obj", shape("initial guess of", &refitted.initial));
     output.add("body.obj", body::write(&inputs.target));
+    if arguments.pose == PoseChoice::Own {
+        let (drape, body) = in_own_pose(inputs, &after, refitted)?;
+        let garment = garment_obj::write(&after, &refitted.x_bar, &drape, frame);
+        output.add("own_pose_garment.obj", garment);
+        output.add("own_pose_body.obj", body::write(&body));
+    }
     output.add(
         "pattern.svg",
         svg::pattern_svg(&before.pattern, &after.pattern, &title),
@@ -140,6 +147,43 @@ fn results(
     output.add("preview.png", picture(&title, inputs, refitted));
     output.add("report.json", json(&full_report(inputs, &refitted.report))?);
     Ok(output)
+}
+
+/// The refitted garment on the target as it stands in its file: carried over and draped there.
+fn in_own_pose(
+    inputs: &Inputs<'_>,
+    garment: &Garment,
+    refitted: &Refit,
+) -> Result<(Vec<Vec3>, Body), Failure> {
+    let body = Body {
+        mesh: inputs.target_own.clone(),
+        ..inputs.target.clone()
+    };
+    let params = &inputs.params.refit;
+    let outward = garment.mesh.outward_triangles();
+    let carried = target_shape(
+        &refitted.x,
+        &outward,
+        &inputs.target,
+        &body,
+        &params.transfer,
+    )
+    .map_err(RefitError::from)?;
+    let there = Garment {
+        drape: Some(carried.x_star),
+        ..garment.clone()
+    };
+    let hold = &params.hold;
+    let found = drape_on(
+        &there,
+        &body,
+        &params.fabric,
+        hold,
+        &params.sim,
+        &mut |_| true,
+    );
+    accept(&found, &body)?;
+    Ok((found.x, body))
 }
 
 /// Pretty JSON with a line end.
@@ -176,6 +220,7 @@ struct FullReport<'a> {
     garment: InputReport,
     source_body: InputReport,
     target_body: InputReport,
+    correspondence: &'a How,
     parameters: &'a Params,
     #[serde(flatten)]
     report: &'a Report,
@@ -187,6 +232,7 @@ fn full_report<'a>(inputs: &'a Inputs<'_>, report: &'a Report) -> FullReport<'a>
         garment: InputReport::of_garment(garment, &inputs.loaded),
         source_body: InputReport::of_body(source, &inputs.source),
         target_body: InputReport::of_body(target, &inputs.target),
+        correspondence: &inputs.how,
         parameters: &inputs.params,
         report,
     }

@@ -6,7 +6,7 @@
 
 use super::cloth::{Cloth, GRAVITY, Rest};
 use super::energy::{bend, membrane};
-use super::sparse::Factor;
+use crate::geometry::sparse::Factor;
 use crate::geometry::{Vec2, Vec3};
 
 /// λᵀ ∂f/∂x̄ at positions `x`: membrane, bending, and weight through the lumped masses. Contact

@@ -7,9 +7,9 @@ use super::energy::contact::{ContactParams, Surface};
 use super::energy::layers::LayerParams;
 use super::equilibrium::{self, EquilibriumParams, RestStatus, Touch};
 use super::layers::{Layers, Watch, hold_apart};
-use super::sparse::Factor;
 use super::step::{State, StepParams, Stepper};
 use super::system::{Assembly, System};
+use crate::geometry::sparse::Factor;
 use crate::geometry::{Vec2, Vec3};
 use serde::{Deserialize, Serialize};
 

@@ -9,9 +9,9 @@ use super::cloth::Cloth;
 use super::energy::contact::Surface;
 use super::energy::layers::Pair;
 use super::layers::{Layers, hold_apart};
-use super::sparse::Factor;
 use super::system::{Assembly, System};
 use crate::geometry::Vec3;
+use crate::geometry::sparse::Factor;
 use serde::{Deserialize, Serialize};
 
 /// How to look for equilibrium.

@@ -5,8 +5,8 @@ use super::cloth::{Cloth, GRAVITY, Rest};
 use super::energy::contact::{self, ContactParams, Surface};
 use super::energy::layers::Pair;
 use super::energy::membrane;
-use super::sparse::{BlockMatrix, Slot, Structure};
 use crate::geometry::Vec3;
+use crate::geometry::sparse::{BlockMatrix, Slot, Structure};
 use std::sync::Arc;
 
 /// Where each element's blocks go in the stiffness matrix; the same for every x and x̄, but for

@@ -178,12 +178,79 @@ fn a_garment_for_a_body() {
 }
 
 #[test]
-fn bodies_that_are_not_the_same_mesh() {
+fn bodies_of_different_meshes_that_are_no_bodies() {
     let place = Workplace::new();
     place.file("other.obj", body() + "v 0 0.8 0\n");
     let before = place.names();
     let ran = place.refit("tee.json", "other.obj", &["--quiet"]);
-    assert_refused(&place, &before, &ran, &["`body`", "`other`", "topology"]);
+    let words = ["body.obj", "other.obj", "no body was recognised"];
+    assert_refused(&place, &before, &ran, &words);
+}
+
+#[test]
+fn what_cannot_be_fitted() {
+    let place = Workplace::new();
+    place.file("beside.obj", two_boxes());
+    place.file("small.obj", body().replace("1.1", "0.02"));
+    place.file("nan.obj", body().replace("1.1", "nan"));
+    place.file("empty.obj", "");
+    place.file("model.npz", "\u{80}\u{2}a pickle");
+    let before = place.names();
+    for (arguments, words) in [
+        (&["body.obj"][..], ["body.obj", "no body was recognised"]),
+        (&["beside.obj"], ["beside.obj", "two bodies"]),
+        (&["small.obj"], ["small.obj", "no person's height"]),
+        (&["nan.obj"], ["nan.obj", "not a"]),
+        (&["empty.obj"], ["empty.obj", "empty"]),
+        (
+            &["body.obj", "--model", "model.npz"],
+            ["model.npz", "not an .npz archive"],
+        ),
+    ] {
+        let ran = place.dress(&[&["body", "fit", "--out", "out"], arguments].concat());
+        assert_refused(&place, &before, &ran, &words);
+    }
+}
+
+/// Two of the boxes, a metre apart.
+fn two_boxes() -> String {
+    let moved = |line: &str| match line.split(' ').collect::<Vec<_>>()[..] {
+        ["v", x, y, z] => format!("v {} {y} {z}\n", x.parse::<f64>().unwrap() + 1.0),
+        ["f", a, b, c, d] => {
+            let next = [a, b, c, d].map(|v| v.parse::<usize>().unwrap() + 8);
+            format!("f {} {} {} {}\n", next[0], next[1], next[2], next[3])
+        }
+        _ => String::new(),
+    };
+    body()
+        .lines()
+        .map(moved)
+        .fold(body(), |all, line| all + &line)
+}
+
+#[test]
+fn a_pose_that_is_none() {
+    let place = Workplace::new();
+    place.file(
+        "pose.toml",
+        "[rotations]\nleft_elbw = [0, 0, 0]\nneck = [1, 2]\n",
+    );
+    let before = place.names();
+    let ran = place.dress(&[
+        "body",
+        "pose",
+        "body.obj",
+        "--pose",
+        "pose.toml",
+        "--out",
+        "out",
+    ]);
+    assert_refused(
+        &place,
+        &before,
+        &ran,
+        &["`left_elbw`", "left_elbow", "`neck`", "three numbers"],
+    );
 }
 
 #[test]
