@@ -20,8 +20,8 @@ use dress_anyone::problem::{BadInput, Problem};
 use dress_anyone::refit::dress::drape_on;
 use dress_anyone::refit::{RefitError, accept, drape_report};
 use dress_anyone::report::DrapeReport;
-use dress_anyone::sim::Drape;
 use dress_anyone::sim::equilibrium::RestStatus;
+use dress_anyone::sim::{Drape, Solver};
 use serde::Serialize;
 use std::path::Path;
 use std::sync::atomic::Ordering;
@@ -84,13 +84,23 @@ pub fn run(arguments: &DrapeArguments) -> Result<String, Failure> {
     };
     // What did not come to rest is worth a look, too.
     results(arguments, &loaded, &body, &found, &report)?.write()?;
-    accepted?;
+    let steps_alone = refit.sim.solver == Solver::Xpbd && found.residual.is_finite();
+    if !steps_alone {
+        accepted?;
+    }
     if arguments.running.quiet {
         return Ok(String::new());
     }
+    let ending = if steps_alone {
+        format!(
+            "stepped, its net force {:.1e} of its weight",
+            found.residual
+        )
+    } else {
+        summary::rest(report.drape.status).to_owned()
+    };
     Ok(format!(
-        "The drape is {} after {seconds:.1} s.\n{}Written to {}\n",
-        summary::rest(report.drape.status),
+        "The drape is {ending} after {seconds:.1} s.\n{}Written to {}\n",
         summary::penetration(&report.drape),
         arguments.out.display()
     ))
