@@ -1,4 +1,4 @@
-//! Symmetric sparse matrices of 3×3 blocks, one block row per cloth vertex, and their Cholesky
+//! Symmetric sparse matrices of 3×3 blocks, one block row per vertex, and their Cholesky
 //! factors. The pattern is fixed, so the symbolic phase is done once and kept.
 
 use crate::geometry::{Mat3, Vec3};
