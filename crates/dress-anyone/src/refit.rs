@@ -7,6 +7,7 @@ pub mod dress;
 mod flatten;
 mod measure;
 mod search;
+mod stiffen;
 mod written;
 
 use crate::body::Body;
@@ -210,12 +211,17 @@ pub fn refit(
         params: &params.descent,
         body: &target.name,
         motions: &motions,
+        fresh_starts: search::FRESH_STARTS,
     };
-    clock.stage("search", observe);
+    clock.stage("search in stiffer cloth", observe);
     let initial = cages.scaled(scale);
     let drapes = [source_drape.as_slice(), &x_star];
     let flattened = flatten::flatten(mesh, &cages, &motions, &losses, drapes, initial.clone());
-    let found = search.run([initial, flattened], &clock, observe)?;
+    let mut guesses = vec![flattened];
+    let third = stiffen::stiffened(&search, initial.clone(), guesses.clone(), &clock, observe)?;
+    guesses.extend(third);
+    clock.stage("search", observe);
+    let found = search.run(initial, guesses, &clock, observe)?;
 
     // The pattern as it will be cut: curves within the tolerance, and the drape of just that.
     clock.stage("pattern as written", observe);
@@ -340,6 +346,7 @@ impl Clock {
 
 /// What a refit ended with before it was written.
 pub(crate) struct Found {
+    zeta: Vec<f64>,
     x_bar: Vec<Vec2>,
     x: Vec<Vec3>,
     initial: Vec<Vec3>,

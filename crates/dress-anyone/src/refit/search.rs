@@ -24,7 +24,7 @@ const LEAST_QUALITY: f64 = 0.82;
 /// A refused step is tried again only while it moves the pattern farther than this \[m\].
 const SHORTEST_TRIAL: f64 = 1e-5;
 /// How often a settled search drapes its pattern again from the target shape.
-const FRESH_STARTS: usize = 4;
+pub(super) const FRESH_STARTS: usize = 4;
 
 /// Everything the search needs and does not change.
 pub(super) struct Search<'a, S> {
@@ -38,6 +38,8 @@ pub(super) struct Search<'a, S> {
     pub(super) scene: &'a Scene<'a, S>,
     pub(super) x_star: &'a [Vec3],
     pub(super) params: &'a DescentParams,
+    /// How often a settled pattern is draped again from the target shape.
+    pub(super) fresh_starts: usize,
 }
 
 /// A pattern, its drape, and its loss.
@@ -60,11 +62,12 @@ struct Run<'a, 'b> {
 }
 
 impl<'s, S: Surface> Search<'s, S> {
-    /// Searches from the better of two guesses, the initial one first. Both are draped from the
+    /// Searches from the best of several guesses, the initial one first. All are draped from the
     /// target shape.
     pub(super) fn run(
         &self,
-        [initial, flattened]: [Vec<f64>; 2],
+        initial: Vec<f64>,
+        others: Vec<Vec<f64>>,
         clock: &Clock,
         observe: &mut Observer<'_>,
     ) -> Result<Found, RefitError> {
@@ -80,10 +83,13 @@ impl<'s, S: Surface> Search<'s, S> {
         let initial = best.state.drape.x.clone();
         self.note(&best, 0.0, &mut run);
         let mut moved = f64::INFINITY;
-        if run.go_on {
-            let second = self.drape(&flattened, self.x_star.to_vec(), &mut run);
-            let second = self.point(flattened, second);
-            if let Some(better) = second.filter(|second| second.total < best.total) {
+        for guess in others {
+            if !run.go_on {
+                break;
+            }
+            let drape = self.drape(&guess, self.x_star.to_vec(), &mut run);
+            let point = self.point(guess, drape);
+            if let Some(better) = point.filter(|point| point.total < best.total) {
                 moved = farthest(&better.state.drape.x_bar, &best.state.drape.x_bar);
                 best = better;
                 self.note(&best, moved, &mut run);
@@ -105,7 +111,7 @@ impl<'s, S: Surface> Search<'s, S> {
             if !settled {
                 stepped = self.step(&best, floor, &mut damping, &mut run);
             }
-            if matches!(stepped, Stepped::NoBetter) && fresh_starts < FRESH_STARTS {
+            if matches!(stepped, Stepped::NoBetter) && fresh_starts < self.fresh_starts {
                 fresh_starts += 1;
                 stepped = self.afresh(&best, &mut run);
             }
@@ -130,6 +136,7 @@ impl<'s, S: Surface> Search<'s, S> {
             }
         };
         Ok(Found {
+            zeta: best.zeta,
             x_bar: best.state.drape.x_bar,
             x: best.state.drape.x,
             initial,
