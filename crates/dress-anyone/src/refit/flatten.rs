@@ -16,6 +16,8 @@ use crate::pattern::PatternMesh;
 use crate::sim::energy::membrane::RestTriangle;
 use nalgebra::DVector;
 
+/// How much more evenness is asked of the cages than in the search, to leave it room.
+const ROOM: f64 = 20.0;
 /// Rounds of rotations and fits.
 const ROUNDS: usize = 12;
 /// Weight of the mean squared strain that remains: 1 % costs 0.1.
@@ -49,7 +51,8 @@ pub(super) fn flatten(
         for wanted in &wanted {
             rows.extend(wanted.rows(&x_bar, (STRAIN * wanted.rest.area / area).sqrt()));
         }
-        let priors = cages.priors(&zeta, losses.weights().affine, losses.weights().cage);
+        let weights = losses.weights();
+        let priors = cages.priors(&zeta, weights.affine, ROOM * weights.cage);
         let model = Model::new(rows.len() + priors.len(), motions.len(), |i, by| {
             let Some(row) = rows.get(i) else {
                 return priors[i - rows.len()].fill(by);
