@@ -45,7 +45,7 @@ class Design:
     scoop_front: float = 5.5  # how far the armhole runs in at its bottom
     scoop_back: float = 4.5
     cap_ease: float = 0.2  # the sleeve's cap over the armhole, in each half
-    lift: float = -0.9  # the flat panels wait this much lower, clear of the armpits
+    lift: float = -1.4  # the flat panels wait this much lower, clear of the armpits
     underarm_seam: float = 12.0
     sleeve_taper: float = 1.0  # each half narrows by this to its hem
     clearance: float = 4.0  # between body and flat panels

@@ -246,9 +246,11 @@ fn only_an_affine_part_widens_a_panel_at_equal_length() {
 /// The unknown that stretches the first panel unevenly, and its size ρ \[m\].
 fn first_affine_unknown(cages: &Cages) -> (usize, f64) {
     let priors = cages.priors(&cages.rest_unknowns(), 1.0, 0.0);
-    let prior = priors.iter().find(|p| p.by.len() == 1 && p.by[0].1 != 0.0);
-    let (j, slope) = prior.expect("an affine part").by[0];
-    (j, 1.0 / slope.abs())
+    let mut slopes = priors.iter().flat_map(|p| &p.by).filter(|(_, d)| *d != 0.0);
+    let (j, real) = *slopes.next().expect("an affine part");
+    // A panel whose axis is oblique has β along it: a real and an imaginary part.
+    let imaginary: f64 = slopes.filter(|(k, _)| *k == j).map(|(_, d)| d).sum();
+    (j, 1.0 / real.hypot(imaginary))
 }
 
 #[test]

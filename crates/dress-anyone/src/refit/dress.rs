@@ -72,7 +72,7 @@ pub fn drape_on(
     let surface = DistanceField::new(&body.mesh, DistanceField::SPACING, DistanceField::OUTER);
     let (x, start) = match &garment.drape {
         Some(x) => (x.clone(), Start::Near),
-        None => (on_the_floor(garment.placed(), body), Start::Placed),
+        None => (above_the_feet(garment.placed(), body), Start::Placed),
     };
     let mut cloth = Cloth::new(&garment.mesh, fabric);
     cloth.holds = holds(garment, &x, hold);
@@ -85,14 +85,23 @@ pub fn drape_on(
     drape(&scene, &garment.mesh.x_bar, x, start, observe)
 }
 
-/// How far above the soles cloth starts at least \[m\].
-const OFF_THE_FLOOR: f64 = 5e-3;
+/// Height of the instep, as a part of the body's: cloth starts above it.
+const INSTEP: f64 = 0.05;
+/// Height below which cloth is squeezed together for that, likewise.
+const SHIN: f64 = 0.15;
 
-/// Lifts what is placed below the body's soles, where it would be caught under the feet.
-fn on_the_floor(mut x: Vec<Vec3>, body: &Body) -> Vec<Vec3> {
-    let floor = body.mesh.bounds().0.y + OFF_THE_FLOOR;
-    for p in &mut x {
-        p.y = p.y.max(floor);
+/// Squeezes together what would start about the feet or below the soles, where it would be caught,
+/// into the space between instep and shin; it falls from there.
+fn above_the_feet(mut x: Vec<Vec3>, body: &Body) -> Vec<Vec3> {
+    let (floor, top) = body.mesh.bounds();
+    let at = |part: f64| floor.y + part * (top.y - floor.y);
+    let (instep, shin) = (at(INSTEP), at(SHIN));
+    let lowest = x.iter().map(|p| p.y).fold(f64::INFINITY, f64::min);
+    if lowest < instep {
+        let squeeze = (shin - instep) / (shin - lowest);
+        for p in x.iter_mut().filter(|p| p.y < shin) {
+            p.y = shin - squeeze * (shin - p.y);
+        }
     }
     x
 }
