@@ -64,6 +64,25 @@ fn every_unit_and_up_axis_is_recognised() {
 }
 
 #[test]
+fn a_body_that_lies_along_x_is_stood_up() {
+    let mut slim = person();
+    for p in &mut slim.positions {
+        // Arms at the sides: 0.8 m broad, half of the height.
+        p.x *= 0.5;
+    }
+    let frame = FileFrame {
+        metres_per_unit: 0.01,
+        up: UpAxis::X,
+    };
+    let (mesh, found, notes) = stand_up(&surface(&slim, frame), &BodyOptions::default()).unwrap();
+    assert_eq!(found, frame, "{notes:?}");
+    for (p, q) in mesh.positions.iter().zip(&slim.positions) {
+        assert!((p - q).norm() < 1e-12);
+    }
+    assert_eq!(mesh.triangles, slim.triangles, "turned, not mirrored");
+}
+
+#[test]
 fn spread_arms_along_z_do_not_pass_for_the_height() {
     let mut turned = person();
     for p in &mut turned.positions {
@@ -76,7 +95,7 @@ fn spread_arms_along_z_do_not_pass_for_the_height() {
             up,
         };
         let seen = match up {
-            UpAxis::Y => surface(&turned, FileFrame::SI),
+            UpAxis::X | UpAxis::Y => surface(&turned, FileFrame::SI),
             UpAxis::Z => Surface {
                 positions: turned
                     .positions
