@@ -180,15 +180,17 @@ const SLICES: usize = 48;
 /// compete, and they do not reach that far.
 const CLEARLY_LONGER: f64 = 1.6;
 
-/// Which axis is up, of `points` on the surface. Arms spread along x mostly, so x has to be clearly
-/// the longest.
+/// Which axis is up, of `points` on the surface. Arms spread along x mostly, so it has to be the
+/// longest, and clearly or without mirror symmetry.
 fn up_axis(points: &[Vec3], notes: &mut Vec<String>) -> Result<UpAxis, Problem> {
     let (low, high) = bounds(points);
     let extent = high - low;
     if extent.max() <= 0.0 {
         return Err(Problem::whole("all vertices are at the same point"));
     }
-    if extent.x > CLEARLY_LONGER * extent.y.max(extent.z) {
+    let next = if extent.y >= extent.z { 1 } else { 2 };
+    let asymmetric = || asymmetry(points, 0) > 1.5 * asymmetry(points, next);
+    if extent.x > CLEARLY_LONGER * extent[next] || extent.x > extent[next] && asymmetric() {
         notes.push("up axis: x".to_owned());
         return Ok(UpAxis::X);
     }

@@ -67,8 +67,8 @@ fn every_unit_and_up_axis_is_recognised() {
 fn a_body_that_lies_along_x_is_stood_up() {
     let mut slim = person();
     for p in &mut slim.positions {
-        // Arms at the sides: 0.8 m broad, half of the height.
-        p.x *= 0.5;
+        // Arms half spread: 1.36 m broad, 1.7 m tall.
+        p.x *= 0.85;
     }
     let frame = FileFrame {
         metres_per_unit: 0.01,
@@ -251,13 +251,15 @@ fn every_shared_body_stands_upright_in_metres() {
         if !path.parent().unwrap().ends_with("cc0") {
             continue;
         }
-        let frame = FileFrame {
-            metres_per_unit: 0.0254,
-            up: UpAxis::Z,
-        };
-        let (mesh, found, _) =
-            stand_up(&surface(&body.mesh, frame), &BodyOptions::default()).unwrap();
-        assert_eq!(found, frame, "{}", body.name);
-        assert_eq!(mesh.triangles, body.mesh.triangles);
+        for up in [UpAxis::X, UpAxis::Z] {
+            let frame = FileFrame {
+                metres_per_unit: 0.0254,
+                up,
+            };
+            let (mesh, found, _) =
+                stand_up(&surface(&body.mesh, frame), &BodyOptions::default()).unwrap();
+            assert_eq!(found, frame, "{}", body.name);
+            assert_eq!(mesh.triangles, body.mesh.triangles);
+        }
     }
 }
