@@ -23,10 +23,23 @@ pub struct Body {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum UpAxis {
+    /// x up; the file's (x, y, z) is (−y, x, z) of a y-up world.
+    X,
     /// y up, the library's own.
     Y,
     /// z up; the file's (x, y, z) is (x, −z, y) of a y-up world.
     Z,
+}
+
+impl UpAxis {
+    /// "x", "y" or "z".
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::X => "x",
+            Self::Y => "y",
+            Self::Z => "z",
+        }
+    }
 }
 
 /// Unit and axes of a file. The library works in metres, y up.
@@ -49,6 +62,7 @@ impl FileFrame {
     pub fn to_si(self, p: Vec3) -> Vec3 {
         let p = p * self.metres_per_unit;
         match self.up {
+            UpAxis::X => Vec3::new(-p.y, p.x, p.z),
             UpAxis::Y => p,
             UpAxis::Z => Vec3::new(p.x, p.z, -p.y),
         }
@@ -57,6 +71,7 @@ impl FileFrame {
     /// From metres, y up, to the file's coordinates; inverse of [`Self::to_si`].
     pub fn from_si(self, p: Vec3) -> Vec3 {
         let p = match self.up {
+            UpAxis::X => Vec3::new(p.y, -p.x, p.z),
             UpAxis::Y => p,
             UpAxis::Z => Vec3::new(p.x, -p.z, p.y),
         };

@@ -221,6 +221,8 @@ pub enum Unit {
 /// [`UpAxis`].
 #[derive(Clone, Copy, Debug, ValueEnum)]
 pub enum Up {
+    /// x
+    X,
     /// y
     Y,
     /// z
@@ -244,6 +246,7 @@ impl Up {
     /// As the library calls it.
     pub fn axis(self) -> UpAxis {
         match self {
+            Self::X => UpAxis::X,
             Self::Y => UpAxis::Y,
             Self::Z => UpAxis::Z,
         }

@@ -5,18 +5,20 @@ mod fit;
 mod pose;
 mod sample;
 mod show;
+mod table;
 
 use crate::failure::Failure;
 use crate::picture::Figure;
-use arguments::{BodyCommand, FileArguments, ModelArguments};
+use arguments::{BodyCommand, FileArguments, LandmarkArguments, ModelArguments};
 use dress_anyone::body::Body;
 use dress_anyone::body_model::BodyModel;
-use dress_anyone::body_model::fit::Fit;
+use dress_anyone::body_model::fit::{Fit, Landmarks};
 use dress_anyone::body_model::measure::Measurement;
-use dress_anyone::geometry::TriangleMesh;
+use dress_anyone::geometry::{TriangleMesh, Vec3};
 use dress_anyone::io::{self, body_model};
-use dress_anyone::problem::BadInput;
+use dress_anyone::problem::{BadInput, Problem};
 use std::fmt::Write;
+use std::path::Path;
 
 /// Does what was asked; what to say about it in the end.
 pub fn run(command: &BodyCommand) -> Result<String, Failure> {
@@ -27,7 +29,7 @@ pub fn run(command: &BodyCommand) -> Result<String, Failure> {
         BodyCommand::Measure(arguments) => {
             crate::set_threads(&arguments.running)?;
             let (model, body) = read(&arguments.model, &arguments.file)?;
-            let fit = fitted(&model, &body, &arguments.file)?;
+            let fit = fitted(&model, &body, &arguments.file, &arguments.landmarks)?;
             Ok(measurements_text(&fit.measurements(&model)))
         }
         BodyCommand::Fit(arguments) => fit::run(arguments),
@@ -46,9 +48,32 @@ fn read(arguments: &ModelArguments, file: &FileArguments) -> Result<(BodyModel, 
 }
 
 /// The model fitted to the file's body.
-fn fitted(model: &BodyModel, body: &Body, file: &FileArguments) -> Result<Fit, Failure> {
-    let fit = dress_anyone::body_model::fit::fit(model, &body.mesh);
+fn fitted(
+    model: &BodyModel,
+    body: &Body,
+    file: &FileArguments,
+    landmarks: &LandmarkArguments,
+) -> Result<Fit, Failure> {
+    let landmarks = match &landmarks.landmarks {
+        Some(path) => read_landmarks(model, body, path)?,
+        None => Landmarks::default(),
+    };
+    let fit = dress_anyone::body_model::fit::fit(model, &body.mesh, &landmarks);
     Ok(fit.map_err(|problems| BadInput::new(&file.file, problems))?)
+}
+
+/// The landmarks in a TOML file, which has them in the unit and axes of the body's file.
+fn read_landmarks(model: &BodyModel, body: &Body, path: &Path) -> Result<Landmarks, BadInput> {
+    let no_place = Vec3::repeat(f64::NAN);
+    let named: Vec<(String, Vec3)> = table::vectors(path, "landmarks")?
+        .into_iter()
+        .map(|(name, point)| (name, point.map_or(no_place, |p| body.frame.to_si(p))))
+        .collect();
+    if named.is_empty() {
+        let problem = Problem::at("table `[landmarks]`", "there is no landmark in it");
+        return Err(BadInput::one(path, problem));
+    }
+    Landmarks::new(model, &body.mesh, &named).map_err(|problems| BadInput::new(path, problems))
 }
 
 /// A table in centimetres.

@@ -2,7 +2,7 @@
 
 use crate::arguments::{InspectArguments, Kind};
 use crate::failure::Failure;
-use dress_anyone::body::{Body, FileFrame, UpAxis};
+use dress_anyone::body::{Body, FileFrame};
 use dress_anyone::garment::Garment;
 use dress_anyone::geometry::Vec2;
 use dress_anyone::io::file::{MEBIBYTE, read_capped};
@@ -78,11 +78,7 @@ fn body_text(body: &Body) -> String {
 }
 
 fn frame_words(frame: FileFrame) -> String {
-    let up = match frame.up {
-        UpAxis::Y => "y",
-        UpAxis::Z => "z",
-    };
-    format!("unit {}, {up} up", frame.unit_name())
+    format!("unit {}, {} up", frame.unit_name(), frame.up.name())
 }
 
 fn notes(text: &mut String, notes: &[String]) {

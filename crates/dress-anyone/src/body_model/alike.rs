@@ -4,7 +4,7 @@
 //! fitted to both; the source stays where and as it stands, for its garment does too, and the target
 //! takes on the source's pose on the same floor, its own surface carried along.
 
-use super::fit::{Fit, fit};
+use super::fit::{Fit, Landmarks, fit};
 use super::skeleton::PELVIS;
 use super::{BodyModel, Pose};
 use crate::body::Body;
@@ -29,7 +29,7 @@ pub type Refusal = [Vec<Problem>; 2];
 
 /// Fits `model` to both bodies and gives the target the source's pose.
 pub fn make_alike(model: &BodyModel, source: &Body, target: &Body) -> Result<Alike, Refusal> {
-    let fits = [source, target].map(|body| fit(model, &body.mesh));
+    let fits = [source, target].map(|body| fit(model, &body.mesh, &Landmarks::default()));
     let [source_fit, target_fit] = match fits {
         [Ok(source), Ok(target)] => [source, target],
         refused => return Err(refused.map(|fit| fit.err().unwrap_or_default())),

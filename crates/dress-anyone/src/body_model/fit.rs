@@ -1,10 +1,11 @@
-//! Fits a body model to any mesh, without landmarks (METHOD §8.2–8.4).
+//! Fits a body model to any mesh, with landmarks or without (METHOD §8.2–8.4).
 //!
 //! Similarity and a bank of poses ([`start`]), then pose, shape and bone stretch by Gauss–Newton on
 //! robust point-to-plane distances both ways ([`pairs`], [`solve`]), then free-form offsets under an
 //! as-rigid-as-possible regulariser ([`offsets`]). The offsets are taken back to the model's rest,
 //! so the result can be posed at will and keeps the surface of the mesh.
 
+mod landmarks;
 mod offsets;
 mod outcome;
 mod pairs;
@@ -17,6 +18,7 @@ use super::measure::{Measurement, measure};
 use super::{BodyModel, Part, Pose, Posed, Shape};
 use crate::geometry::{TriangleMesh, Vec3};
 use crate::problem::Problem;
+pub use landmarks::{LandmarkDistance, Landmarks};
 use outcome::Limits;
 pub use outcome::{Distances, Figures, PartFigures};
 use rayon::prelude::*;
@@ -53,6 +55,8 @@ pub struct FitReport {
     pub distances: Distances,
     /// Faces that are turned over where a garment can touch.
     pub flipped_faces: usize,
+    /// How far the fitted body is from the landmarks that were given.
+    pub landmarks: Vec<LandmarkDistance>,
     /// What was noticed and tolerated.
     pub notes: Vec<String>,
     /// Duration of the fit \[s\].
@@ -119,12 +123,16 @@ const ROUNDS: [Round; 5] = [
     },
 ];
 
-/// Fits `model` to `mesh` \[m\]; or tells why the mesh is no body.
-pub fn fit(model: &BodyModel, mesh: &TriangleMesh) -> Result<Fit, Vec<Problem>> {
+/// Fits `model` to `mesh` \[m\], helped by `landmarks`; or tells why the mesh is no body.
+pub fn fit(
+    model: &BodyModel,
+    mesh: &TriangleMesh,
+    landmarks: &Landmarks,
+) -> Result<Fit, Vec<Problem>> {
     let clock = Instant::now();
     let mut notes = Vec::new();
     let skin = skin::outer_skin(mesh, &mut notes)?;
-    let scan = Scan::new(skin);
+    let scan = Scan::new(skin, landmarks.clone());
     let mut state = pose_and_build(model, &scan);
     let whole = Surface::whole(model);
     for round in &ROUNDS[COARSE_ROUNDS..] {
@@ -146,6 +154,9 @@ pub fn fit(model: &BodyModel, mesh: &TriangleMesh) -> Result<Fit, Vec<Problem>> 
     let posed = model.posed(&state.shape, &state.pose, &offsets);
     let mesh = surface(&posed.positions);
     let distances = outcome::distances(&mesh, &parts, &scan);
+    let from_landmarks = landmarks.distances(&posed);
+    let strain = without_offsets.scan_to_fit.p95;
+    notes.extend(landmarks::notes(&from_landmarks, strain));
     outcome::refuse_strangers(&distances, CLOSELY)?;
     let State { shape, pose } = state;
     Ok(Fit {
@@ -159,6 +170,7 @@ pub fn fit(model: &BodyModel, mesh: &TriangleMesh) -> Result<Fit, Vec<Problem>> 
             without_offsets,
             distances,
             flipped_faces: moved.flipped,
+            landmarks: from_landmarks,
             notes,
             seconds: clock.elapsed().as_secs_f64(),
         },

@@ -104,8 +104,12 @@ fn pose_feature(local: &[Mat3]) -> Vec<f64> {
 impl Posed {
     /// Joints \[m\], `[joint]`.
     pub fn heads(&self) -> Vec<Vec3> {
-        let place = |head: &Vec3| head * self.scale + self.translation;
-        self.heads.iter().map(place).collect()
+        (0..self.heads.len()).map(|j| self.head(j)).collect()
+    }
+
+    /// Joint `j` \[m\].
+    pub fn head(&self, j: usize) -> Vec3 {
+        self.heads[j] * self.scale + self.translation
     }
 
     /// What has to be added to vertex `v` at rest to move it by `offset` \[m\] in this pose; none
@@ -132,6 +136,15 @@ pub struct Jacobian<'a> {
     shift_slopes: Vec<Vec3>,
     /// Rows of ∂R_k/∂θ_k, `[joint − 1][parameter]`; only where pose moves vertices at rest.
     feature_slopes: Vec<[Mat3; 3]>,
+}
+
+/// A point that the bones carry.
+struct Carried<'a> {
+    position: Vec3,
+    rest: Vec3,
+    weights: &'a [(u32, f64)],
+    /// What one unit of each component adds to it at rest.
+    directions: &'a [Vec3],
 }
 
 /// Parameters before the rotations: translation and ln s.
@@ -182,21 +195,47 @@ impl<'a> Jacobian<'a> {
     /// Adds n · ∂x_v/∂parameters to `row`.
     pub fn add_row(&self, v: usize, n: Vec3, row: &mut [f64]) {
         let (parts, posed) = (&self.model.parts, self.posed);
+        let components = parts.component_count();
+        let vertex = Carried {
+            position: posed.positions[v],
+            rest: posed.rest[v],
+            weights: &parts.weights[v],
+            directions: &parts.directions[v * components..(v + 1) * components],
+        };
+        let turned = self.add_carried(&vertex, n, row);
+        self.add_pose_directions(v, turned, row);
+    }
+
+    /// Adds n · ∂(joint j)/∂parameters to `row`.
+    pub fn add_joint_row(&self, j: usize, n: Vec3, row: &mut [f64]) {
+        let (model, posed) = (self.model, self.posed);
+        let components = model.parts.component_count();
+        let joint = Carried {
+            position: posed.head(j),
+            rest: posed.turns[j].tr_mul(&(posed.heads[j] - posed.shifts[j])),
+            weights: &[(j as u32, 1.0)],
+            directions: &model.joint_directions[j * components..(j + 1) * components],
+        };
+        self.add_carried(&joint, n, row);
+    }
+
+    /// Adds n · ∂x/∂parameters to `row`, but for the pose directions; (Σ w G^R)ᵀ n s.
+    fn add_carried(&self, point: &Carried<'_>, n: Vec3, row: &mut [f64]) -> Vec3 {
+        let (parts, posed) = (&self.model.parts, self.posed);
         let joint_count = parts.joint_count();
         let n_scaled = n * posed.scale;
         for c in 0..3 {
             row[c] += n[c];
         }
-        row[3] += n.dot(&(posed.positions[v] - posed.translation));
+        row[3] += n.dot(&(point.position - posed.translation));
 
         // What hangs on each joint: weight, and weighted posed points.
         let mut moments = vec![(0.0, Vec3::zeros()); joint_count];
         let mut turned = Vec3::zeros();
-        let rest = posed.rest[v];
-        for &(j, w) in &parts.weights[v] {
+        for &(j, w) in point.weights {
             let j = j as usize;
             moments[j].0 += w;
-            moments[j].1 += (posed.turns[j] * rest + posed.shifts[j]) * w;
+            moments[j].1 += (posed.turns[j] * point.rest + posed.shifts[j]) * w;
             turned += posed.turns[j].tr_mul(&n_scaled) * w;
         }
         for j in (0..joint_count).rev() {
@@ -215,21 +254,19 @@ impl<'a> Jacobian<'a> {
                 row[at + c] += slope[c];
             }
         }
-        self.add_pose_directions(v, turned, row);
-
         let components = parts.component_count();
         let tail = &mut row[BEFORE_ROTATIONS + 3 * joint_count..];
-        let directions = &parts.directions[v * components..(v + 1) * components];
-        for (entry, direction) in tail.iter_mut().zip(directions) {
+        for (entry, direction) in tail.iter_mut().zip(point.directions) {
             *entry += turned.dot(direction);
         }
-        for &(j, w) in &parts.weights[v] {
+        for &(j, w) in point.weights {
             let at = j as usize * components;
             let slopes = &self.shift_slopes[at..at + components];
             for (entry, slope) in tail.iter_mut().zip(slopes) {
                 *entry += w * n_scaled.dot(slope);
             }
         }
+        turned
     }
 
     /// The share of the pose directions: `turned` is (Σ w G^R)ᵀ n s.

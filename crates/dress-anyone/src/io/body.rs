@@ -1,7 +1,7 @@
 //! Bodies from OBJ, PLY and STL: which unit, which axis is up, which side is out.
 //!
 //! A file says none of these. The unit is the one that makes the body as tall as a person; up is
-//! the axis along which it is long and not mirror-symmetric; out is where the enclosed volume is
+//! the axis along which it is long and not mirror-symmetric (x only where it clearly lies along it); out is where the enclosed volume is
 //! positive. What was found is told in [`Body::notes`], and both guesses can be overruled.
 //!
 //! Vertices are kept, unused ones too, in the file's order, and polygons are cut into triangles by
@@ -98,17 +98,19 @@ fn stand_up(
             "holds vertices but no faces: a point cloud has to be meshed first",
         ));
     }
-    let used: Vec<Vec3> = triangles
-        .iter()
-        .flatten()
-        .map(|v| surface.positions[*v as usize])
-        .collect();
+    let mut is_used = vec![false; surface.positions.len()];
+    for v in triangles.as_flattened() {
+        is_used[*v as usize] = true;
+    }
+    let pairs = surface.positions.iter().zip(&is_used);
+    let used: Vec<Vec3> = pairs.filter(|(_, used)| **used).map(|(p, _)| *p).collect();
     let up = match options.up {
         Some(up) => up,
         None => up_axis(&used, &mut notes)?,
     };
     let (low, high) = bounds(&used);
     let height = match up {
+        UpAxis::X => high.x - low.x,
         UpAxis::Y => high.y - low.y,
         UpAxis::Z => high.z - low.z,
     };
@@ -122,8 +124,9 @@ fn stand_up(
         positions,
         triangles,
     };
-    surface::turn_outward(&mut mesh, &mut notes);
-    surface::describe(&mesh, &mut notes);
+    let edges = surface::Edges::of(&mesh.triangles);
+    surface::turn_outward(&mut mesh, &edges, &mut notes);
+    surface::describe(&mesh, &edges, &mut notes);
     Ok((mesh, frame, notes))
 }
 
@@ -177,29 +180,27 @@ const SLICES: usize = 48;
 /// compete, and they do not reach that far.
 const CLEARLY_LONGER: f64 = 1.6;
 
-/// Which axis is up, of `points` on the surface.
+/// Which axis is up, of `points` on the surface. Arms spread along x mostly, so it has to be the
+/// longest, and clearly or without mirror symmetry.
 fn up_axis(points: &[Vec3], notes: &mut Vec<String>) -> Result<UpAxis, Problem> {
     let (low, high) = bounds(points);
     let extent = high - low;
     if extent.max() <= 0.0 {
         return Err(Problem::whole("all vertices are at the same point"));
     }
-    if extent.x > CLEARLY_LONGER * extent.y.max(extent.z) {
-        return Err(Problem::whole(
-            "the body lies along x: turn it so that y or z is up, or say which axis is up",
-        ));
+    let next = if extent.y >= extent.z { 1 } else { 2 };
+    let asymmetric = || asymmetry(points, 0) > 1.5 * asymmetry(points, next);
+    if extent.x > CLEARLY_LONGER * extent[next] || extent.x > extent[next] && asymmetric() {
+        notes.push("up axis: x".to_owned());
+        return Ok(UpAxis::X);
     }
-    let name = |up| match up {
-        UpAxis::Y => "y",
-        UpAxis::Z => "z",
-    };
     let longer = if extent.y >= extent.z {
         UpAxis::Y
     } else {
         UpAxis::Z
     };
     if extent.y.max(extent.z) > CLEARLY_LONGER * extent.y.min(extent.z) {
-        notes.push(format!("up axis: {}", name(longer)));
+        notes.push(format!("up axis: {}", longer.name()));
         return Ok(longer);
     }
     // Arms spread along the other axis. Left mirrors right, but head does not mirror feet.
@@ -213,7 +214,7 @@ fn up_axis(points: &[Vec3], notes: &mut Vec<String>) -> Result<UpAxis, Problem> 
     };
     notes.push(format!(
         "up axis: {}, though y and z are of similar extent ({:.3} and {:.3} units)",
-        name(up),
+        up.name(),
         extent.y,
         extent.z
     ));

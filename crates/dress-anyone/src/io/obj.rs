@@ -255,11 +255,11 @@ impl ObjText {
             decimals,
         };
         obj.comment(title);
-        let up = match frame.up {
-            crate::body::UpAxis::Y => "y",
-            crate::body::UpAxis::Z => "z",
-        };
-        obj.comment(&format!("unit: {}, {up} up", frame.unit_name()));
+        obj.comment(&format!(
+            "unit: {}, {} up",
+            frame.unit_name(),
+            frame.up.name()
+        ));
         obj
     }
 

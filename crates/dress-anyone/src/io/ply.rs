@@ -163,10 +163,11 @@ impl Element {
         } else {
             self.count
         };
+        let mut list = Vec::new();
         for i in 0..count {
             let mut position = Vec3::repeat(f64::NAN);
             for property in &self.properties {
-                let list = property.read(values)?;
+                property.read(values, &mut list)?;
                 match (self.name.as_str(), property.name.as_str()) {
                     ("vertex", "x") => position.x = list[0],
                     ("vertex", "y") => position.y = list[0],
@@ -201,8 +202,8 @@ fn polygon(list: &[f64], face: usize, problems: &mut Problems) -> Vec<u32> {
 }
 
 impl Property {
-    /// The items of a list, or the one value.
-    fn read(&self, values: &mut Values) -> Option<Vec<f64>> {
+    /// The items of a list, or the one value, into `list`; none if the file ends too early.
+    fn read(&self, values: &mut Values, list: &mut Vec<f64>) -> Option<()> {
         let length = match self.list {
             Some(kind) => values.next(kind)?,
             None => 1.0,
@@ -211,9 +212,11 @@ impl Property {
         if !(0.0..=values.remaining() as f64).contains(&length) {
             return None;
         }
-        (0..length as usize)
-            .map(|_| values.next(self.item))
-            .collect()
+        list.clear();
+        for _ in 0..length as usize {
+            list.push(values.next(self.item)?);
+        }
+        Some(())
     }
 }
 

@@ -60,6 +60,9 @@ pub struct PoseArguments {
     /// Folder for the results
     #[arg(long, value_name = "FOLDER", default_value = "dress-out")]
     pub out: PathBuf,
+    /// Landmarks.
+    #[command(flatten)]
+    pub landmarks: LandmarkArguments,
     /// The model.
     #[command(flatten)]
     pub model: ModelArguments,
@@ -74,6 +77,9 @@ pub struct MeasureArguments {
     /// The body.
     #[command(flatten)]
     pub file: FileArguments,
+    /// Landmarks.
+    #[command(flatten)]
+    pub landmarks: LandmarkArguments,
     /// The model.
     #[command(flatten)]
     pub model: ModelArguments,
@@ -91,6 +97,9 @@ pub struct FitArguments {
     /// Folder for the results
     #[arg(long, value_name = "FOLDER", default_value = "dress-out")]
     pub out: PathBuf,
+    /// Landmarks.
+    #[command(flatten)]
+    pub landmarks: LandmarkArguments,
     /// The model.
     #[command(flatten)]
     pub model: ModelArguments,
@@ -105,6 +114,14 @@ pub struct ModelArguments {
     /// Body model in SMPL's layout (plain .npz) [default: built in]
     #[arg(long, value_name = "FILE")]
     pub model: Option<PathBuf>,
+}
+
+/// What is known of the body.
+#[derive(Debug, Args)]
+pub struct LandmarkArguments {
+    /// TOML file with a table `landmarks`: joint or point = [x, y, z] in the body file's unit and axes
+    #[arg(long, value_name = "FILE")]
+    pub landmarks: Option<PathBuf>,
 }
 
 /// A body file and how to read it.

@@ -35,7 +35,7 @@ pub fn run(arguments: &FitArguments) -> Result<String, Failure> {
     check_writable(&arguments.out)?;
     let mut progress = Progress::new(arguments.running.quiet);
     progress.notes(&body.name, &body.notes);
-    let fit = fitted(&model, &body, &arguments.file)?;
+    let fit = fitted(&model, &body, &arguments.file, &arguments.landmarks)?;
     progress.notes(&body.name, &fit.report.notes);
     let measurements = fit.measurements(&model);
     let report = Report {

@@ -1,19 +1,18 @@
 //! `dress body pose`.
 
 use super::arguments::PoseArguments;
+use super::table::vectors;
 use super::{bare, fitted, read};
 use crate::failure::Failure;
 use crate::picture::{View, preview};
 use dress_anyone::body::FileFrame;
 use dress_anyone::body_model::{BodyModel, Pose, joint_name};
 use dress_anyone::geometry::{Vec3, bounds};
-use dress_anyone::io::file::{MEBIBYTE, read_capped};
 use dress_anyone::io::obj;
 use dress_anyone::io::output::{Output, check_writable};
 use dress_anyone::problem::{BadInput, Problem};
 use std::f64::consts::FRAC_PI_4;
 use std::path::Path;
-use toml::{Table, Value};
 
 /// Fits, poses and writes; what to say about it in the end.
 pub fn run(arguments: &PoseArguments) -> Result<String, Failure> {
@@ -25,7 +24,7 @@ pub fn run(arguments: &PoseArguments) -> Result<String, Failure> {
         "t" => model.arms_at(0.0),
         file => from_file(&model, Path::new(file))?,
     };
-    let fit = fitted(&model, &body, &arguments.file)?;
+    let fit = fitted(&model, &body, &arguments.file, &arguments.landmarks)?;
     let (low, high) = bounds(&fit.posed(&model, &pose).positions);
     pose.translation = Vec3::new(-0.5 * (low.x + high.x), -low.y, -0.5 * (low.z + high.z));
     let posed = fit.posed(&model, &pose);
@@ -41,24 +40,13 @@ pub fn run(arguments: &PoseArguments) -> Result<String, Failure> {
     Ok(format!("Written to {}\n", arguments.out.display()))
 }
 
-/// Pose files are short.
-const LIMIT: u64 = MEBIBYTE;
-
 /// The pose in a TOML file; joints it leaves out stay as in the model's zero pose.
 fn from_file(model: &BodyModel, path: &Path) -> Result<Pose, BadInput> {
-    let bad = |text: String| BadInput::one(path, Problem::whole(text));
-    let text = String::from_utf8(read_capped(path, LIMIT)?)
-        .map_err(|_| bad("this is no text; a pose is TOML".to_owned()))?;
-    let table: Table = text.parse().map_err(|error| bad(format!("{error}")))?;
-    let rotations = table.get("rotations").and_then(Value::as_table);
-    let Some(rotations) = rotations else {
-        return Err(bad("there is no table `[rotations]` in it".to_owned()));
-    };
     let mut pose = Pose::zero(model);
     let mut problems = Vec::new();
-    for (name, value) in rotations {
-        let joint = (0..pose.rotations.len()).find(|j| joint_name(*j) == *name);
-        match (joint, degrees(value)) {
+    for (name, degrees) in vectors(path, "rotations")? {
+        let joint = (0..pose.rotations.len()).find(|j| joint_name(*j) == name);
+        match (joint, degrees) {
             (Some(joint), Some(angles)) => pose.rotations[joint] = angles * 1_f64.to_radians(),
             (None, _) => {
                 let known: Vec<String> = (0..pose.rotations.len()).map(joint_name).collect();
@@ -76,14 +64,4 @@ fn from_file(model: &BodyModel, path: &Path) -> Result<Pose, BadInput> {
     } else {
         Err(BadInput::new(path, problems))
     }
-}
-
-/// Three finite numbers.
-fn degrees(value: &Value) -> Option<Vec3> {
-    let [x, y, z] = value.as_array()?.as_slice() else {
-        return None;
-    };
-    let number = |v: &Value| v.as_float().or_else(|| v.as_integer().map(|i| i as f64));
-    let angles = Vec3::new(number(x)?, number(y)?, number(z)?);
-    angles.iter().all(|a| a.is_finite()).then_some(angles)
 }

@@ -254,6 +254,45 @@ fn a_pose_that_is_none() {
 }
 
 #[test]
+fn landmarks_that_are_none() {
+    let place = Workplace::new();
+    place.file(
+        "known.toml",
+        "[landmarks]\nleft_elbw = [0, 1, 0]\nneck = [1, 2]\nnose = [0, nan, 0]\ncrown = [0, 110, 0]\n",
+    );
+    place.file(
+        "twice.toml",
+        "[landmarks]\nneck = [0, 1, 0]\nneck = [0, 1, 0]\n",
+    );
+    place.file("empty.toml", "[landmarks]\n");
+    let before = place.names();
+    let all = [
+        "`left_elbw`",
+        "left_elbow",
+        "`neck`",
+        "`nose`",
+        "`crown`",
+        "outside the body",
+    ];
+    for (file, words) in [
+        ("known.toml", &all[..]),
+        ("twice.toml", &["duplicate key"]),
+        ("empty.toml", &["no landmark"]),
+    ] {
+        let arguments = [
+            "body",
+            "fit",
+            "body.obj",
+            "--out",
+            "out",
+            "--landmarks",
+            file,
+        ];
+        assert_refused(&place, &before, &place.dress(&arguments), words);
+    }
+}
+
+#[test]
 fn a_folder_for_a_file() {
     let place = Workplace::new();
     std::fs::create_dir(place.path("folder")).unwrap();

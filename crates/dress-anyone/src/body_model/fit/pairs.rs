@@ -129,7 +129,8 @@ pub(super) fn quantile(body: &TriangleMesh, scan: &Scan, share: f64) -> f64 {
 /// Every how manyth point a quantile is taken of.
 const COARSE: usize = 6;
 
-fn geman_mcclure(squared: f64, sigma: f64) -> f64 {
+/// Weight of a pair at a distance: 1 when it is zero, a quarter at `sigma`.
+pub(super) fn geman_mcclure(squared: f64, sigma: f64) -> f64 {
     let s = sigma * sigma;
     (s / (s + squared)).powi(2)
 }

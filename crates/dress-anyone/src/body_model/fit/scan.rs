@@ -1,6 +1,7 @@
 //! The surface to fit, prepared for questions: closest points, smooth normals, rims, and samples
 //! spread evenly over its area.
 
+use super::landmarks::Landmarks;
 use crate::geometry::{ClosestPoint, Foot, TriangleMesh, Vec3};
 use std::collections::BTreeMap;
 
@@ -8,6 +9,7 @@ use std::collections::BTreeMap;
 pub(super) struct Scan {
     pub(super) mesh: TriangleMesh,
     pub(super) samples: Vec<Sample>,
+    pub(super) landmarks: Landmarks,
     surface: ClosestPoint,
     normals: Vec<Vec3>,
     /// Whether a vertex lies on the rim of a hole.
@@ -25,7 +27,7 @@ pub(super) struct Sample {
 const SAMPLES: usize = 16_000;
 
 impl Scan {
-    pub(super) fn new(mesh: TriangleMesh) -> Self {
+    pub(super) fn new(mesh: TriangleMesh, landmarks: Landmarks) -> Self {
         let normals = mesh.vertex_normals();
         let samples = spread(&mesh, SAMPLES)
             .into_iter()
@@ -40,6 +42,7 @@ impl Scan {
             surface: ClosestPoint::new(&mesh),
             on_rim: rim(&mesh),
             samples,
+            landmarks,
             normals,
             mesh,
         }

@@ -139,6 +139,9 @@ pub(super) fn clusters(mesh: &TriangleMesh, cell: f64) -> (Vec<u32>, usize) {
     let mut index_of_cell: BTreeMap<[i64; 3], u32> = BTreeMap::new();
     let mut index = vec![u32::MAX; mesh.positions.len()];
     for &v in mesh.triangles.as_flattened() {
+        if index[v as usize] != u32::MAX {
+            continue;
+        }
         let p = mesh.positions[v as usize];
         let key = [p.x, p.y, p.z].map(|c| (c / cell).floor() as i64);
         let next = index_of_cell.len() as u32;

@@ -1,10 +1,11 @@
 //! Gauss–Newton over place, size, pose, shape and bone stretch.
 //!
 //! Minimises the mean of the weighted squared distances \[m²\] plus λ_i (p_i − p_i⁰)² for every
-//! parameter, with closed-form Jacobians; pairs are sought anew before every step.
+//! parameter, and what landmarks add, with closed-form Jacobians; pairs are sought anew before every step.
 
 use super::super::pose::{BEFORE_ROTATIONS, Jacobian};
 use super::super::{BodyModel, Part, Pose, Shape};
+use super::landmarks::Pull;
 use super::pairs::{Row, Search, pairs, quantile};
 use super::scan::Scan;
 use super::skin::{clusters, collapsed};
@@ -97,7 +98,7 @@ impl<'a> Surface<'a> {
     }
 
     /// Share of both surfaces without a partner within `sigma` \[m\]: 0 for the same, 1 for
-    /// nothing near.
+    /// nothing near; and as much again for the landmarks.
     pub(super) fn misfit(&self, scan: &Scan, state: &State, sigma: f64) -> f64 {
         let posed = self.model.posed(&state.shape, &state.pose, &[]);
         let search = Search {
@@ -107,7 +108,8 @@ impl<'a> Surface<'a> {
         };
         let rows = pairs(&self.at(&posed.positions), &self.parts, scan, search);
         let most = 2.0 * self.vertices.len() as f64;
-        1.0 - rows.iter().map(|row| row.weight).sum::<f64>() / most
+        let missed = scan.landmarks.misfit(&posed);
+        1.0 - rows.iter().map(|row| row.weight).sum::<f64>() / most + missed
     }
 }
 
@@ -132,7 +134,8 @@ pub(super) fn refine(surface: &Surface<'_>, scan: &Scan, state: &mut State, roun
             row.corners = row.corners.map(|v| surface.vertices[v as usize]);
         }
         let jacobian = Jacobian::new(model, &posed, &state.pose);
-        let Some(step) = step(&jacobian, &rows, &costs, &values(state)) else {
+        let pulls = scan.landmarks.pulls(&posed, round.sigma);
+        let Some(step) = step(&jacobian, &rows, &pulls, &costs, &values(state)) else {
             return;
         };
         take(state, &step);
@@ -201,6 +204,7 @@ const CHUNK: usize = 512;
 pub(super) fn step(
     jacobian: &Jacobian<'_>,
     rows: &[Row],
+    pulls: &[Pull],
     costs: &[f64],
     values: &[f64],
 ) -> Option<Vec<f64>> {
@@ -219,6 +223,9 @@ pub(super) fn step(
         matrix += part;
         slope += part_slope;
     }
+    let (pull, pull_slope) = landmark_equations(jacobian, pulls, &free);
+    matrix += pull;
+    slope += pull_slope;
     for (i, at) in free.iter().enumerate() {
         matrix[(i, i)] += costs[*at] + DAMPING;
         slope[i] += costs[*at] * values[*at];
@@ -256,6 +263,29 @@ fn normal_equations(
             matrix[(i, c)] = root * full[*at];
         }
         residuals[i] = root * row.residual;
+    }
+    (matrix.tr_mul(&matrix), matrix.tr_mul(&residuals))
+}
+
+/// Jᵀ W J and Jᵀ W r of the landmarks, along the three axes.
+fn landmark_equations(
+    jacobian: &Jacobian<'_>,
+    pulls: &[Pull],
+    free: &[usize],
+) -> (DMatrix<f64>, DVector<f64>) {
+    let mut matrix = DMatrix::zeros(3 * pulls.len(), free.len());
+    let mut residuals = DVector::zeros(3 * pulls.len());
+    let mut full = vec![0.0; jacobian.parameter_count()];
+    for (i, pull) in pulls.iter().enumerate() {
+        let root = pull.weight.sqrt();
+        for axis in 0..3 {
+            full.fill(0.0);
+            pull.add_row(jacobian, Vec3::ith(axis, 1.0), &mut full);
+            for (c, at) in free.iter().enumerate() {
+                matrix[(3 * i + axis, c)] = root * full[*at];
+            }
+            residuals[3 * i + axis] = root * pull.residual[axis];
+        }
     }
     (matrix.tr_mul(&matrix), matrix.tr_mul(&residuals))
 }

@@ -78,7 +78,7 @@ fn someone(model: &BodyModel, seed: u64) -> (Shape, TriangleMesh) {
 fn a_sampled_body_remeshed_and_posed_otherwise_is_found_again() {
     let model = built_in();
     let (shape, mesh) = someone(&model, 11);
-    let fit = fit(&model, &remeshed(&mesh)).unwrap();
+    let fit = fit(&model, &remeshed(&mesh), &Landmarks::default()).unwrap();
     let (found, true_body) = (fit.a_pose(&model), model.a_pose(&shape, &[]));
     let parts = model.parts_of_vertices();
     let surface = ClosestPoint::new(&found);
@@ -111,7 +111,7 @@ fn a_noisy_scan_with_holes_anywhere_in_space_gives_the_same_measurements() {
     let (shape, mesh) = someone(&model, 5);
     let turn = rotation_about(Vec3::new(0.3, 2.0, -0.2));
     let scan = scanned(&remeshed(&mesh), 1e-3, turn, Vec3::new(3.0, -1.0, 0.5));
-    let fit = fit(&model, &scan).unwrap();
+    let fit = fit(&model, &scan, &Landmarks::default()).unwrap();
     let found = measure(&model, &fit.shape, &fit.offsets);
     for (m, truth) in found.iter().zip(measure(&model, &shape, &[])) {
         let error = (m.length - truth.length).abs();
@@ -163,6 +163,66 @@ fn a_chair_is_no_body() {
                 .extend([[a, b, c], [a, c, d]].map(|t| t.map(|v| v + first)));
         }
     }
-    let told = fit(&built_in(), &chair).unwrap_err();
+    let told = fit(&built_in(), &chair, &Landmarks::default()).unwrap_err();
     assert!(told[0].text.contains("no body was recognised"), "{told:?}");
+}
+
+/// Joints of `posed` as landmarks of `mesh`.
+fn told(model: &BodyModel, mesh: &TriangleMesh, joints: &[usize], posed: &Posed) -> Landmarks {
+    let named: Vec<(String, Vec3)> = joints
+        .iter()
+        .map(|j| (crate::body_model::joint_name(*j), posed.head(*j)))
+        .collect();
+    Landmarks::new(model, mesh, &named).unwrap()
+}
+
+#[test]
+fn a_body_without_arms_holds_them_where_landmarks_say() {
+    let model = built_in();
+    let shape = model.sample(&mut Random::new(3));
+    let mut pose = model.arms_at(0.9);
+    // The left arm forward, out of every starting pose.
+    pose.rotations[16] += Vec3::new(0.0, -0.8, 0.0);
+    let posed = model.posed(&shape, &pose, &[]);
+    let parts = model.parts_of_vertices();
+    let armless = |t: &&[u32; 3]| {
+        let part = |v: &u32| parts[*v as usize];
+        !t.iter()
+            .any(|v| matches!(part(v), Part::LeftArm | Part::LeftHand))
+    };
+    let template = &model.parts().template.triangles;
+    let mesh = TriangleMesh {
+        positions: posed.positions.clone(),
+        triangles: template.iter().filter(armless).copied().collect(),
+    };
+    let elbow_and_wrist = |landmarks: Landmarks| {
+        let scan = Scan::new(mesh.clone(), landmarks);
+        let state = pose_and_build(&model, &scan);
+        let found = model.posed(&state.shape, &state.pose, &[]);
+        [18, 20].map(|j| (found.head(j) - posed.head(j)).norm())
+    };
+    let alone = elbow_and_wrist(Landmarks::default());
+    let helped = elbow_and_wrist(told(&model, &mesh, &[16, 18, 20], &posed));
+    for (alone, helped) in alone.into_iter().zip(helped) {
+        // A landmark's own accuracy is 3 cm; nothing else says where a missing arm is.
+        assert!(helped < 0.03 && alone > 0.08, "{helped} {alone}");
+    }
+}
+
+#[test]
+fn true_landmarks_leave_a_good_fit_as_good() {
+    let model = built_in();
+    let (shape, mesh) = someone(&model, 11);
+    let mut pose = model.arms_at(1.0);
+    pose.rotations[4] = Vec3::new(0.15, 0.0, 0.0);
+    pose.rotations[18] = Vec3::new(0.0, -0.3, 0.0);
+    let posed = model.posed(&shape, &pose, &[]);
+    let fit = fit(&model, &mesh, &told(&model, &mesh, &[4, 5, 18], &posed)).unwrap();
+    // As without landmarks: on the model's own mesh, far below a millimetre.
+    assert!(fit.report.distances.scan_to_fit.mean < 1e-3);
+    assert!(fit.report.notes.is_empty(), "{:?}", fit.report.notes);
+    for d in &fit.report.landmarks {
+        // What the sampled body's joints are found again to.
+        assert!(d.distance < 0.01, "{}: {}", d.name, d.distance);
+    }
 }

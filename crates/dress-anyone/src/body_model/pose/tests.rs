@@ -85,16 +85,25 @@ fn every_parameters_slope_is_that_of_central_differences() {
         .collect();
     let posed = model.posed(&shape, &pose, &offsets);
     let jacobian = Jacobian::new(&model, &posed, &pose);
-    for v in 0..6 {
-        let n = Vec3::from_fn(|c, _| noise(400 + 3 * v + c));
+    // The vertices, then the joints.
+    for at in 0..6 + 3 {
+        let n = Vec3::from_fn(|c, _| noise(400 + 3 * at + c));
         let mut row = vec![0.0; jacobian.parameter_count()];
-        jacobian.add_row(v, n, &mut row);
+        match at {
+            0..6 => jacobian.add_row(at, n, &mut row),
+            _ => jacobian.add_joint_row(at - 6, n, &mut row),
+        }
         for (i, slope) in row.iter().enumerate() {
             let mut along = still.clone();
             along[i] = 1.0;
             let value = |s: f64| {
                 let (shape, pose) = state(&model, &along, s);
-                n.dot(&model.posed(&shape, &pose, &offsets).positions[v])
+                let posed = model.posed(&shape, &pose, &offsets);
+                n.dot(&if at < 6 {
+                    posed.positions[at]
+                } else {
+                    posed.head(at - 6)
+                })
             };
             // Round-off over the step: 1e-16 / 1e-5, times values of order ten.
             assert_derivative(value, *slope, STEP, 1.0, 1e-8);

@@ -3,7 +3,7 @@
 
 use crate::geometry::TriangleMesh;
 use crate::geometry::groups::Groups;
-use std::collections::{BTreeMap, BTreeSet};
+use rayon::prelude::*;
 
 /// Fans of triangles from the first corner of each polygon. Only the topology decides, so that
 /// bodies with the same polygons get the same triangles.
@@ -31,9 +31,8 @@ pub(crate) fn triangulate(polygons: &[Vec<u32>], notes: &mut Vec<String>) -> Vec
 
 /// Makes neighbouring triangles agree on their winding, and every closed component (and the
 /// largest) enclose a positive volume.
-pub(crate) fn turn_outward(mesh: &mut TriangleMesh, notes: &mut Vec<String>) {
-    let edges = edges(&mesh.triangles);
-    let components = components(&mesh.triangles, &edges);
+pub(crate) fn turn_outward(mesh: &mut TriangleMesh, edges: &Edges, notes: &mut Vec<String>) {
+    let components = components(&mesh.triangles, edges);
     let largest = components.iter().map(|c| c.triangles.len()).max();
     let (mut turned, mut inside_out, mut one_sided) = (0, 0, 0);
     for component in &components {
@@ -72,8 +71,7 @@ pub(crate) fn turn_outward(mesh: &mut TriangleMesh, notes: &mut Vec<String>) {
 }
 
 /// Notes on components, holes, odd edges and unused vertices.
-pub(crate) fn describe(mesh: &TriangleMesh, notes: &mut Vec<String>) {
-    let edges = edges(&mesh.triangles);
+pub(crate) fn describe(mesh: &TriangleMesh, edges: &Edges, notes: &mut Vec<String>) {
     let sizes = component_sizes(mesh);
     if sizes.len() > 1 {
         let shown: Vec<String> = sizes.iter().take(8).map(ToString::to_string).collect();
@@ -84,20 +82,24 @@ pub(crate) fn describe(mesh: &TriangleMesh, notes: &mut Vec<String>) {
             shown.join(", ")
         ));
     }
-    let open = edges.iter().filter(|(_, sides)| sides.len() == 1);
-    let open: Vec<[u32; 2]> = open.map(|(edge, _)| *edge).collect();
-    let holes = group_sizes(&open, mesh.positions.len()).len();
+    let open = &edges.open;
+    let holes = group_sizes(open, mesh.positions.len()).len();
     match holes {
         0 => {}
         1 => notes.push(format!("1 hole, of {} edges", open.len())),
         _ => notes.push(format!("{holes} holes, of {} edges together", open.len())),
     }
-    let tangled = edges.values().filter(|sides| sides.len() > 2).count();
-    if tangled > 0 {
-        notes.push(format!("{tangled} edges have more than two triangles"));
+    if edges.tangled > 0 {
+        notes.push(format!(
+            "{} edges have more than two triangles",
+            edges.tangled
+        ));
     }
-    let used: BTreeSet<u32> = mesh.triangles.iter().flatten().copied().collect();
-    let unused = mesh.positions.len() - used.len();
+    let mut used = vec![false; mesh.positions.len()];
+    for v in mesh.triangles.as_flattened() {
+        used[*v as usize] = true;
+    }
+    let unused = used.iter().filter(|used| !**used).count();
     if unused > 0 {
         notes.push(format!(
             "{unused} vertices belong to no face; they are kept"
@@ -105,18 +107,51 @@ pub(crate) fn describe(mesh: &TriangleMesh, notes: &mut Vec<String>) {
     }
 }
 
-/// Triangles at each edge (smaller vertex first), and whether they run it in that direction.
-type Edges = BTreeMap<[u32; 2], Vec<(usize, bool)>>;
+/// How triangles meet. Half-edge 3 t + k of triangle t runs from its corner k to the next.
+pub(crate) struct Edges {
+    /// The half-edge of the other triangle at the same edge; `NONE` unless there are just two.
+    mates: Vec<u32>,
+    /// Edges of one triangle only.
+    open: Vec<[u32; 2]>,
+    /// How many edges have more than two.
+    tangled: usize,
+}
 
-fn edges(triangles: &[[u32; 3]]) -> Edges {
-    let mut edges = Edges::new();
-    for (t, &[a, b, c]) in triangles.iter().enumerate() {
-        for [from, to] in [[a, b], [b, c], [c, a]] {
-            let key = [from.min(to), from.max(to)];
-            edges.entry(key).or_default().push((t, from < to));
+/// No half-edge.
+const NONE: u32 = u32::MAX;
+
+impl Edges {
+    /// Of these triangles, as they are wound now.
+    pub(crate) fn of(triangles: &[[u32; 3]]) -> Self {
+        let mut halves: Vec<([u32; 2], u32)> = Vec::with_capacity(3 * triangles.len());
+        for h in 0..3 * triangles.len() as u32 {
+            let [from, to] = ends(triangles, h);
+            halves.push(([from.min(to), from.max(to)], h));
         }
+        halves.par_sort_unstable();
+        let mut edges = Self {
+            mates: vec![NONE; halves.len()],
+            open: Vec::new(),
+            tangled: 0,
+        };
+        for same in halves.chunk_by(|a, b| a.0 == b.0) {
+            match same {
+                [(edge, _)] => edges.open.push(*edge),
+                [(_, one), (_, two)] => {
+                    edges.mates[*one as usize] = *two;
+                    edges.mates[*two as usize] = *one;
+                }
+                _ => edges.tangled += 1,
+            }
+        }
+        edges
     }
-    edges
+}
+
+/// From which vertex to which a half-edge runs.
+fn ends(triangles: &[[u32; 3]], h: u32) -> [u32; 2] {
+    let (triangle, k) = (triangles[h as usize / 3], h as usize % 3);
+    [triangle[k], triangle[(k + 1) % 3]]
 }
 
 /// Triangles connected through edges of exactly two triangles.
@@ -146,16 +181,16 @@ fn components(triangles: &[[u32; 3]], edges: &Edges) -> Vec<Component> {
         while let Some(&t) = component.triangles.get(next) {
             let flip = component.flips[next];
             next += 1;
-            let [a, b, c] = triangles[t];
-            for [from, to] in [[a, b], [b, c], [c, a]] {
-                let sides = &edges[&[from.min(to), from.max(to)]];
-                let [one, two] = sides[..] else {
+            for h in 3 * t..3 * t + 3 {
+                let mate = edges.mates[h];
+                if mate == NONE {
                     component.closed = false;
                     continue;
-                };
-                let (other, along) = if one.0 == t { two } else { one };
+                }
+                let other = mate as usize / 3;
                 // Neighbours agree when they run their edge in opposite directions.
-                let other_flip = flip ^ (along == (from < to));
+                let against = ends(triangles, mate)[0] != ends(triangles, h as u32)[0];
+                let other_flip = flip ^ !against;
                 match flip_of[other] {
                     None => {
                         flip_of[other] = Some(other_flip);
@@ -195,15 +230,18 @@ fn component_sizes(mesh: &TriangleMesh) -> Vec<usize> {
 /// link are no group.
 fn group_sizes(links: &[[u32; 2]], count: usize) -> Vec<usize> {
     let mut groups = Groups::new(count);
+    let mut linked = vec![false; count];
     for &link in links {
         groups.join(link);
+        for v in link {
+            linked[v as usize] = true;
+        }
     }
-    let linked: BTreeSet<u32> = links.iter().flatten().copied().collect();
-    let mut sizes: BTreeMap<u32, usize> = BTreeMap::new();
-    for v in linked {
-        *sizes.entry(groups.first_of(v)).or_default() += 1;
+    let mut sizes = vec![0; count];
+    for v in (0..count).filter(|v| linked[*v]) {
+        sizes[groups.first_of(v as u32) as usize] += 1;
     }
-    let mut sizes: Vec<usize> = sizes.into_values().collect();
+    sizes.retain(|size| *size > 0);
     sizes.sort_unstable_by(|a, b| b.cmp(a));
     sizes
 }

@@ -64,6 +64,25 @@ fn every_unit_and_up_axis_is_recognised() {
 }
 
 #[test]
+fn a_body_that_lies_along_x_is_stood_up() {
+    let mut slim = person();
+    for p in &mut slim.positions {
+        // Arms half spread: 1.36 m broad, 1.7 m tall.
+        p.x *= 0.85;
+    }
+    let frame = FileFrame {
+        metres_per_unit: 0.01,
+        up: UpAxis::X,
+    };
+    let (mesh, found, notes) = stand_up(&surface(&slim, frame), &BodyOptions::default()).unwrap();
+    assert_eq!(found, frame, "{notes:?}");
+    for (p, q) in mesh.positions.iter().zip(&slim.positions) {
+        assert!((p - q).norm() < 1e-12);
+    }
+    assert_eq!(mesh.triangles, slim.triangles, "turned, not mirrored");
+}
+
+#[test]
 fn spread_arms_along_z_do_not_pass_for_the_height() {
     let mut turned = person();
     for p in &mut turned.positions {
@@ -76,7 +95,7 @@ fn spread_arms_along_z_do_not_pass_for_the_height() {
             up,
         };
         let seen = match up {
-            UpAxis::Y => surface(&turned, FileFrame::SI),
+            UpAxis::X | UpAxis::Y => surface(&turned, FileFrame::SI),
             UpAxis::Z => Surface {
                 positions: turned
                     .positions
@@ -232,13 +251,22 @@ fn every_shared_body_stands_upright_in_metres() {
         if !path.parent().unwrap().ends_with("cc0") {
             continue;
         }
-        let frame = FileFrame {
-            metres_per_unit: 0.0254,
-            up: UpAxis::Z,
+        // The goblin is broader than tall; x is taken for up only where it is the longest.
+        let is_tall = high.y - low.y > high.x - low.x;
+        let ups = if is_tall {
+            &[UpAxis::X, UpAxis::Z][..]
+        } else {
+            &[UpAxis::Z]
         };
-        let (mesh, found, _) =
-            stand_up(&surface(&body.mesh, frame), &BodyOptions::default()).unwrap();
-        assert_eq!(found, frame, "{}", body.name);
-        assert_eq!(mesh.triangles, body.mesh.triangles);
+        for &up in ups {
+            let frame = FileFrame {
+                metres_per_unit: 0.0254,
+                up,
+            };
+            let (mesh, found, _) =
+                stand_up(&surface(&body.mesh, frame), &BodyOptions::default()).unwrap();
+            assert_eq!(found, frame, "{}", body.name);
+            assert_eq!(mesh.triangles, body.mesh.triangles);
+        }
     }
 }
