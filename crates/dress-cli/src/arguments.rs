@@ -132,7 +132,7 @@ pub struct ReadingArguments {
     /// Parameters (TOML); `dress params` prints them all
     #[arg(long, value_name = "FILE")]
     pub params: Option<PathBuf>,
-    /// What the cloth is made of: a name, or a file with the keys of [fabric] (TOML)
+    /// What the cloth is made of: a name, or a file with the keys of the table "fabric" (TOML)
     #[arg(long, value_name = "NAME|FILE")]
     pub fabric: Option<PathBuf>,
     /// Length of mesh edges, where a pattern has to be meshed [default: 20]

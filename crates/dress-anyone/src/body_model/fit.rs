@@ -1,8 +1,8 @@
 //! Fits a body model to any mesh, with landmarks or without (METHOD §8.2–8.4).
 //!
-//! Similarity and a bank of poses ([`start`]), then pose, shape and bone stretch by Gauss–Newton on
-//! robust point-to-plane distances both ways ([`pairs`], [`solve`]), then free-form offsets under an
-//! as-rigid-as-possible regulariser ([`offsets`]). The offsets are taken back to the model's rest,
+//! Similarity and a bank of poses (`start`), then pose, shape and bone stretch by Gauss–Newton on
+//! robust point-to-plane distances both ways (`pairs`, `solve`), then free-form offsets under an
+//! as-rigid-as-possible regulariser (`offsets`). The offsets are taken back to the model's rest,
 //! so the result can be posed at will and keeps the surface of the mesh.
 
 mod landmarks;
