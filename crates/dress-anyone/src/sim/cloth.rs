@@ -27,6 +27,8 @@ pub struct Cloth {
     /// Area of each cloth vertex in the reference pattern \[m²\]; constant, so that contact
     /// stiffness has no derivative by x̄.
     pub reference_area: Vec<f64>,
+    /// Where the cloth meets the body: its vertices and the middles of its edges.
+    pub contacts: Vec<ContactPoint>,
     /// Membrane stiffness.
     pub elasticity: Elasticity,
     /// Bending rigidity \[N·m\].
@@ -49,6 +51,24 @@ pub struct Hinge {
     pub vertices: [u32; 4],
     /// Pattern vertices (p0, p1, opposite) of each side.
     pub rest: [[u32; 3]; 2],
+}
+
+/// A point of the cloth that feels the body: the middle of an edge, or a vertex, which is the middle
+/// of an edge from itself to itself.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ContactPoint {
+    /// Cloth vertices.
+    pub ends: [u32; 2],
+    /// Its part of the reference pattern's area \[m²\].
+    pub area: f64,
+}
+
+impl ContactPoint {
+    /// Where it is \[m\].
+    pub fn at(&self, x: &[Vec3]) -> Vec3 {
+        let [a, b] = self.ends.map(|a| x[a as usize]);
+        0.5 * (a + b)
+    }
 }
 
 /// A vertex kept near a height by a spring, as an elastic waistband or a neckline tape does:
@@ -75,6 +95,7 @@ impl Cloth {
         }
         Self {
             hinges: hinges(&mesh.triangles, &triangles),
+            contacts: contact_points(mesh, &triangles),
             rest_triangles: mesh.triangles.clone(),
             triangles,
             sewing: mesh.sewing.clone(),
@@ -137,6 +158,22 @@ impl Rest {
     pub fn weight(&self) -> f64 {
         self.mass.iter().map(|m| m * m).sum::<f64>().sqrt() * GRAVITY.norm()
     }
+}
+
+/// Vertices and edge middles with the areas that integrate over every triangle cut in four: each
+/// vertex has a quarter of a third of a triangle's area, each middle a quarter of it.
+fn contact_points(mesh: &PatternMesh, welded: &[[u32; 3]]) -> Vec<ContactPoint> {
+    let mut areas: BTreeMap<[u32; 2], f64> = BTreeMap::new();
+    for (t, triangle) in welded.iter().enumerate() {
+        let area = mesh.rest_area(t, &mesh.x_bar);
+        for corner in 0..3 {
+            let (a, b) = (triangle[corner], triangle[(corner + 1) % 3]);
+            *areas.entry([a, a]).or_insert(0.0) += area / 12.0;
+            *areas.entry([a.min(b), a.max(b)]).or_insert(0.0) += area / 4.0;
+        }
+    }
+    let point = |(ends, area)| ContactPoint { ends, area };
+    areas.into_iter().map(point).collect()
 }
 
 /// The interior edges of the welded mesh; an edge of more than two triangles gets one hinge per

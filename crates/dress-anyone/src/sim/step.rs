@@ -5,7 +5,7 @@
 //! at usual sweep counts its rest state is centimetres too long (METHOD §1.5), so the static solve
 //! follows.
 
-use super::cloth::{Cloth, GRAVITY, Rest};
+use super::cloth::{Cloth, ContactPoint, GRAVITY, Rest};
 use super::energy::contact::{ContactParams, Surface};
 use super::energy::membrane::{Elasticity, constraint};
 use super::layers::Watch;
@@ -74,9 +74,9 @@ pub struct Stepper<'a, S> {
     watch: Watch,
 }
 
-/// A vertex near the body: its contact linearised once per step.
+/// A contact point near the body: its contact linearised once per step.
 struct Touch {
-    vertex: usize,
+    point: ContactPoint,
     normal: Vec3,
     /// c = normal·x − offset.
     offset: f64,
@@ -212,35 +212,43 @@ impl<'a, S: Surface> Stepper<'a, S> {
 
     fn sweep_contact(&self, touching: &mut [Touch], x: &mut [Vec3]) {
         for touch in touching {
-            let w = self.w[touch.vertex];
-            let p = &mut x[touch.vertex];
-            let c = touch.normal.dot(p) - touch.offset;
+            let [a, b] = touch.point.ends.map(|a| a as usize);
+            // ∂p/∂x of an end is ½; a vertex is both its ends.
+            let w = if a == b {
+                self.w[a]
+            } else {
+                0.25 * (self.w[a] + self.w[b])
+            };
+            let c = touch.normal.dot(&touch.point.at(x)) - touch.offset;
             let wanted =
                 touch.lambda + (-c - touch.alpha_tilde * touch.lambda) / (w + touch.alpha_tilde);
             let delta = wanted.max(0.0) - touch.lambda;
             touch.lambda += delta;
-            *p += touch.normal * (w * delta);
+            for a in [a, b] {
+                x[a] += touch.normal * (0.5 * self.w[a] * delta);
+            }
         }
     }
 
-    /// Contacts of the positions before the step: a vertex outside thin parts (toes, fingers) then
+    /// Contacts of the positions before the step: a point outside thin parts (toes, fingers) then
     /// stays on its side of them.
     fn touching(&self, x: &[Vec3]) -> Vec<Touch> {
         let per_time = 1.0 / (self.params.dt * self.params.dt);
         let reach = self.contact.thickness + 2.0 * self.params.speed * self.params.dt;
-        let touch = |(vertex, p): (usize, &Vec3)| {
-            let (d, gradient) = self.surface.distance(*p).filter(|(d, _)| *d < reach)?;
+        let touch = |point: &ContactPoint| {
+            let p = point.at(x);
+            let (d, gradient) = self.surface.distance(p).filter(|(d, _)| *d < reach)?;
             let normal = gradient.try_normalize(1e-3)?;
-            let kappa = self.contact.stiffness * self.cloth.reference_area[vertex];
+            let kappa = self.contact.stiffness * point.area;
             Some(Touch {
-                vertex,
+                point: *point,
                 normal,
-                offset: normal.dot(p) - (d - self.contact.thickness),
+                offset: normal.dot(&p) - (d - self.contact.thickness),
                 alpha_tilde: per_time / kappa,
                 lambda: 0.0,
             })
         };
-        x.iter().enumerate().filter_map(touch).collect()
+        self.cloth.contacts.iter().filter_map(touch).collect()
     }
 }
 

@@ -1,7 +1,7 @@
 //! The total energy U(x; x̄) of cloth on a body, its force and stiffness (METHOD §1.4: membrane,
 //! bending, contact, holds, weight), assembled from the pieces of [`super::energy`].
 
-use super::cloth::{Cloth, GRAVITY, Rest};
+use super::cloth::{Cloth, ContactPoint, GRAVITY, Rest};
 use super::energy::contact::{self, ContactParams, Surface};
 use super::energy::layers::Pair;
 use super::energy::membrane;
@@ -18,6 +18,8 @@ pub struct Assembly {
     triangles: Vec<[Slot; 6]>,
     /// Lower-triangle block pairs of each hinge, in the order of [`PAIRS`].
     hinges: Vec<[Slot; 10]>,
+    /// Lower-triangle block pairs of each contact point: first end, both, second end.
+    contacts: Vec<[Slot; 3]>,
     vertices: Vec<Slot>,
 }
 
@@ -59,6 +61,14 @@ impl Assembly {
                 .iter()
                 .map(|h| {
                     std::array::from_fn(|p| slot(h.vertices[PAIRS[p].0], h.vertices[PAIRS[p].1]))
+                })
+                .collect(),
+            contacts: cloth
+                .contacts
+                .iter()
+                .map(|point| {
+                    let [a, b] = point.ends;
+                    [slot(a, a), slot(a, b), slot(b, b)]
                 })
                 .collect(),
             vertices: (0..cloth.vertex_count as u32).map(|v| slot(v, v)).collect(),
@@ -109,7 +119,10 @@ impl<S: Surface> System<'_, S> {
         }
         for (a, p) in x.iter().enumerate() {
             sum -= self.rest.mass[a] * GRAVITY.dot(p);
-            sum += contact::energy(self.surface, self.kappa(a), self.contact.thickness, *p);
+        }
+        for point in &self.cloth.contacts {
+            let h = self.contact.thickness;
+            sum += contact::energy(self.surface, self.kappa(point), h, point.at(x));
         }
         for hold in &self.cloth.holds {
             let off = x[hold.vertex as usize].y - hold.height;
@@ -141,8 +154,12 @@ impl<S: Surface> System<'_, S> {
                 f[*a as usize] += force;
             }
         }
-        for (a, p) in x.iter().enumerate() {
-            f[a] += contact::force(self.surface, self.kappa(a), self.contact.thickness, *p);
+        for point in &self.cloth.contacts {
+            let h = self.contact.thickness;
+            let force = contact::force(self.surface, self.kappa(point), h, point.at(x));
+            for a in point.ends {
+                f[a as usize] += 0.5 * force;
+            }
         }
         for hold in &self.cloth.holds {
             let a = hold.vertex as usize;
@@ -198,10 +215,20 @@ impl<S: Surface> System<'_, S> {
                 k.add_scalar(*slot, if twice { 2.0 * value } else { value });
             }
         }
-        for (a, p) in x.iter().enumerate() {
-            let h = self.contact.thickness;
-            if let Some(block) = contact::stiffness(self.surface, self.kappa(a), h, *p, exactness) {
-                k.add(assembly.vertices[a], &block);
+        for (point, slots) in self.cloth.contacts.iter().zip(&assembly.contacts) {
+            let (kappa, h) = (self.kappa(point), self.contact.thickness);
+            let p = point.at(x);
+            let Some(block) = contact::stiffness(self.surface, kappa, h, p, exactness) else {
+                continue;
+            };
+            let [a, b] = point.ends;
+            if a == b {
+                k.add(slots[0], &block);
+            } else {
+                // The block is symmetric, so it is its own transpose in the lower triangle.
+                for slot in slots {
+                    k.add(*slot, &(0.25 * block));
+                }
             }
         }
         for hold in &self.cloth.holds {
@@ -216,9 +243,9 @@ impl<S: Surface> System<'_, S> {
         force.iter().map(Vec3::norm_squared).sum::<f64>().sqrt() / self.rest.weight()
     }
 
-    /// Contact stiffness of vertex `a` \[N/m\].
-    pub fn kappa(&self, a: usize) -> f64 {
-        self.contact.stiffness * self.cloth.reference_area[a]
+    /// Contact stiffness of a point \[N/m\].
+    pub fn kappa(&self, point: &ContactPoint) -> f64 {
+        self.contact.stiffness * point.area
     }
 }
 

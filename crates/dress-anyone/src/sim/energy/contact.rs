@@ -1,5 +1,7 @@
-//! Contact of cloth vertices with the static body: a compliant one-sided constraint (Stuyck & Chen
-//! 2023), U = ½ κ min(d(x) − h, 0)² per vertex, with κ = κ₀ · (reference vertex area).
+//! Contact of points of the cloth with the static body: a compliant one-sided constraint (Stuyck &
+//! Chen 2023), U = ½ κ min(d(p) − h, 0)² per point, with κ = κ₀ · (the point's reference area).
+//! The points are vertices and middles of edges ([`crate::sim::cloth::ContactPoint`]): with vertices
+//! alone, toes and collar bones come through between them.
 //!
 //! The distance d comes from a [`Surface`] with a gradient and a Hessian, so force and stiffness
 //! are exact derivatives of the energy, contact curvature included.
@@ -45,7 +47,7 @@ impl Surface for Nothing {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct ContactParams {
-    /// Distance h at which cloth vertices start to feel the body \[m\]: half the cloth's
+    /// Distance h at which cloth starts to feel the body \[m\]: half the cloth's
     /// thickness plus what edges cut off at curved places. 2e-3 to 5e-3. The paper gives none.
     pub thickness: f64,
     /// κ₀ \[N/m³\]: pressure per depth. Higher sinks in less and solves slower.
@@ -61,7 +63,7 @@ impl Default for ContactParams {
     }
 }
 
-/// Energy of one vertex of contact stiffness `kappa` \[N/m\] at p, with offset h \[m\].
+/// Energy of one point of contact stiffness `kappa` \[N/m\] at p, with offset h \[m\].
 pub fn energy(surface: &impl Surface, kappa: f64, h: f64, p: Vec3) -> f64 {
     match surface.distance(p) {
         Some((d, _)) if d < h => 0.5 * kappa * (d - h) * (d - h),
