@@ -53,6 +53,13 @@ impl Default for StepParams {
     }
 }
 
+impl StepParams {
+    /// Steps that make up the time.
+    pub fn steps(&self) -> usize {
+        (self.time / self.dt).ceil() as usize
+    }
+}
+
 /// Positions and velocities.
 #[derive(Clone, Debug)]
 pub struct State {

@@ -119,3 +119,5 @@ fn steps_that_are_run_again_change_nothing() {
     assert_eq!(every.x_bar, some.x_bar);
     assert_eq!(every.start.x, some.start.x);
 }
+
+mod implicit;
