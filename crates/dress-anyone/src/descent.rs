@@ -1,15 +1,48 @@
-//! Levenberg–Marquardt steps over plain vectors; knows nothing of garments (METHOD §6.2).
+//! How a search descends. Here Levenberg–Marquardt steps over plain vectors, which know nothing of
+//! garments (METHOD §6.2); steps by the gradient alone are in [`slope`].
 //!
 //! The loss is a sum of squared residuals R(p). With J = ∂R/∂p, H = JᵀJ and g = JᵀR, the step is
 //! d = −(H + μ diag H + μ ε I)⁻¹ g, the small ε for directions that change nothing.
 
+pub mod slope;
+
+use crate::problem::Problem;
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
+
+/// What makes the steps.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Optimizer {
+    /// Levenberg–Marquardt: needs the drape's answer to every unknown, and few drapes.
+    #[default]
+    Lm,
+    /// Limited-memory BFGS: needs the gradient alone.
+    Lbfgs,
+    /// Gradient descent with backtracking, as in the paper.
+    Descent,
+}
+
+/// Where derivatives of the drape come from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Gradient {
+    /// The state of rest: one solve.
+    #[default]
+    Equilibrium,
+    /// The steps that led to where the cloth is after `sim.step.time`, as in the paper.
+    Trajectory,
+}
 
 /// How to descend.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct DescentParams {
+    /// What makes the steps: `lm`, `lbfgs`, or the paper's `descent`.
+    pub optimizer: Optimizer,
+    /// Where derivatives of the drape come from: `equilibrium`, or the paper's `trajectory`, which
+    /// goes with `lbfgs` and `descent`.
+    pub gradient: Gradient,
     /// Largest number of accepted steps. Each costs a drape; the paper's gradient descent takes
     /// hundreds.
     pub iterations: usize,
@@ -29,6 +62,8 @@ pub struct DescentParams {
 impl Default for DescentParams {
     fn default() -> Self {
         Self {
+            optimizer: Optimizer::default(),
+            gradient: Gradient::default(),
             iterations: 40,
             refusals: 6,
             damping: 1e-2,
@@ -36,6 +71,18 @@ impl Default for DescentParams {
             tolerance: 2e-3,
             least_step: 2e-4,
         }
+    }
+}
+
+impl DescentParams {
+    /// What does not go together.
+    pub fn problems(&self) -> Vec<Problem> {
+        if self.optimizer == Optimizer::Lm && self.gradient == Gradient::Trajectory {
+            let text = "`trajectory` gives a gradient, and `lm` needs more; choose the optimizer \
+                        `lbfgs` or `descent`, or the gradient `equilibrium`";
+            return vec![Problem::at("descent parameter `gradient`", text)];
+        }
+        Vec::new()
     }
 }
 

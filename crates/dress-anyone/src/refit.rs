@@ -1,32 +1,34 @@
 //! The refit (paper §4): a garment that fits one body in, the same design for another body out.
 //!
 //! [`refit`] is the data flow: source drape → target shape x* (§4.2) → cages (§4.3) and symmetry
-//! (§4.5) → initial scale → drapes and steps (§3, §4.4) → the pattern as written.
+//! (§4.5) → initial scale, all these in `refit/prepare.rs` → drapes and steps (§3, §4.4) → the
+//! pattern as written.
 
 pub mod dress;
 mod flatten;
+pub mod gradient_check;
 mod measure;
+mod prepare;
 mod search;
 mod stiffen;
 mod written;
 
 use crate::body::Body;
-use crate::body::distance_field::DistanceField;
-use crate::cage::{CageParams, Cages};
-use crate::descent::DescentParams;
+use crate::cage::CageParams;
+use crate::descent::{DescentParams, Gradient};
 use crate::garment::{Fabric, Garment};
 use crate::geometry::{Vec2, Vec3};
-use crate::loss::{LossParams, LossTerms, Losses};
+use crate::loss::{LossParams, LossTerms};
 use crate::pattern::Pattern;
-use crate::pattern::symmetry::Symmetry;
 use crate::problem::Problem;
 use crate::report::{Report, StageTime, Status};
 use crate::sim::drape::DrapeProgress;
 use crate::sim::equilibrium::RestStatus;
-use crate::sim::{Assembly, Cloth, Scene, SimParams, Start, drape};
-use crate::transfer::{TransferError, TransferParams, target_shape};
-use dress::{HoldParams, drape_on, holds};
+use crate::sim::{SimParams, Start, drape};
+use crate::transfer::{TransferError, TransferParams};
+use dress::{HoldParams, drape_on};
 pub use measure::drape_report;
+use prepare::Prepared;
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
 
@@ -165,61 +167,30 @@ pub fn refit(
     observe: &mut Observer<'_>,
 ) -> Result<Refit, RefitError> {
     let mut clock = Clock::new();
-    let mesh = &garment.mesh;
+    let prepared = Prepared::new(garment, source, target, params, &mut clock, observe)?;
+    let (cages, losses) = (&prepared.cages, &prepared.losses);
+    let (source_drape, x_star) = (&prepared.source_drape, &prepared.x_star);
 
-    // The drape on the source body: the file's own, or from the placed panels.
-    clock.stage("source drape", observe);
-    let source_drape = match &garment.drape {
-        Some(x) => x.clone(),
-        None => drape_to_rest(garment, source, params, observe)?,
-    };
-
-    // §4.2: the shape to aim for.
-    clock.stage("target shape", observe);
-    let outward = mesh.outward_triangles();
-    let x_star = target_shape(&source_drape, &outward, source, target, &params.transfer)?.x_star;
-
-    // §4.3, §4.5: the unknowns are the control points of one cage per panel.
-    clock.stage("cages", observe);
-    let symmetry = params
-        .symmetry
-        .then(|| Symmetry::detect(&garment.pattern, mesh, garment.drape.as_deref()));
-    let cages = Cages::enclose(&garment.pattern, mesh, symmetry.as_ref(), &params.cage)
-        .map_err(RefitError::Garment)?;
-    let scale = initial_scale(garment, &source_drape, &x_star);
-
-    // §3, §4.4: drape, compare, step.
-    clock.stage("target body", observe);
-    let surface = DistanceField::new(&target.mesh, DistanceField::SPACING, DistanceField::OUTER);
-    let mut cloth = Cloth::new(mesh, &params.fabric);
-    cloth.holds = holds(garment, &x_star, &params.hold);
-    let assembly = Assembly::new(&cloth);
-    let scene = Scene {
-        cloth: &cloth,
-        assembly: &assembly,
-        surface: &surface,
-        params: &params.sim,
-    };
-    let losses = Losses::new(&garment.pattern, mesh, &x_star, &params.loss);
-    let motions = search::motions(&cages, mesh);
-    let search = search::Search {
-        mesh,
-        cages: &cages,
-        losses: &losses,
-        scene: &scene,
-        x_star: &x_star,
-        params: &params.descent,
-        body: &target.name,
-        motions: &motions,
-        fresh_starts: search::FRESH_STARTS,
-    };
-    clock.stage("search in stiffer cloth", observe);
-    let initial = cages.scaled(scale);
-    let drapes = [source_drape.as_slice(), &x_star];
-    let flattened = flatten::flatten(mesh, &cages, &motions, &losses, drapes, initial.clone());
+    // §3, §4.4, §4.6: drape, compare, step, from the best of three guesses.
+    let scene = prepared.scene();
+    let search = prepared.search(&scene);
+    let initial = prepared.initial();
+    let motions = &prepared.motions;
+    let drapes = [source_drape.as_slice(), x_star];
+    let flattened = flatten::flatten(
+        &garment.mesh,
+        cages,
+        motions,
+        losses,
+        drapes,
+        initial.clone(),
+    );
     let mut guesses = vec![flattened];
-    let third = stiffen::stiffened(&search, initial.clone(), guesses.clone(), &clock, observe)?;
-    guesses.extend(third);
+    if params.descent.gradient == Gradient::Equilibrium {
+        clock.stage("search in stiffer cloth", observe);
+        let third = stiffen::stiffened(&search, initial.clone(), guesses.clone(), &clock, observe)?;
+        guesses.extend(third);
+    }
     clock.stage("search", observe);
     let found = search.run(initial, guesses, &clock, observe)?;
 
@@ -239,16 +210,16 @@ pub fn refit(
         garment,
         source,
         target,
-        source_drape: &source_drape,
-        x_star: &x_star,
-        symmetry: symmetry.as_ref(),
+        source_drape,
+        x_star,
+        symmetry: prepared.symmetry.as_ref(),
         written: &written,
         last: &last,
-        losses: &losses,
+        losses,
     };
     let report = measured.report(
         found.status,
-        scale,
+        prepared.scale,
         cages.unknown_count(),
         found.iterations,
         clock.stages,
@@ -257,8 +228,8 @@ pub fn refit(
         pattern: written.pattern,
         x_bar: written.x_bar,
         x: last.x,
-        source_drape,
-        x_star,
+        source_drape: prepared.source_drape,
+        x_star: prepared.x_star,
         initial: found.initial,
         report,
     })
@@ -297,20 +268,6 @@ pub fn accept(found: &crate::sim::Drape, body: &Body) -> Result<(), RefitError> 
         status: found.status,
         residual: found.residual,
     })
-}
-
-/// The uniform scale of the initial guess (§4.6, corrected): √ of the growth of the cloth's area
-/// from drape to target, so that stretch already in the drape does not count as size.
-fn initial_scale(garment: &Garment, drape: &[Vec3], x_star: &[Vec3]) -> f64 {
-    let triangles = garment.mesh.cloth_triangles();
-    let area = |x: &[Vec3]| -> f64 {
-        let doubled = |t: &[u32; 3]| {
-            let [a, b, c] = t.map(|v| x[v as usize]);
-            (b - a).cross(&(c - a)).norm()
-        };
-        triangles.iter().map(doubled).sum()
-    };
-    (area(x_star) / area(drape)).sqrt().clamp(0.3, 3.0)
 }
 
 /// Times the stages.

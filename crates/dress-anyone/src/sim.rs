@@ -13,6 +13,8 @@ pub mod equilibrium;
 pub mod layers;
 pub mod step;
 pub mod system;
+pub mod trajectory;
 pub use cloth::{Cloth, Hold, Rest};
 pub use drape::{Drape, Scene, SimParams, Solver, Start, drape};
 pub use system::Assembly;
+pub use trajectory::Trajectory;

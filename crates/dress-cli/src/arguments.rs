@@ -1,16 +1,18 @@
 //! The command line.
 
-use crate::body::arguments::{BodyCommand, ModelArguments};
+pub mod fitting;
+
+use crate::body::arguments::BodyCommand;
 use crate::params::{self, Params};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use dress_anyone::body::UpAxis;
-use dress_anyone::cage::CageKind;
 use dress_anyone::io::body::BodyOptions;
 use dress_anyone::io::garment::GarmentOptions;
 use dress_anyone::io::garment_obj::UvOptions;
 use dress_anyone::io::garmentcode::RotationOrder;
 use dress_anyone::problem::BadInput;
 use dress_anyone::sim::Solver;
+use fitting::FittingArguments;
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
@@ -28,6 +30,8 @@ pub struct Arguments {
 pub enum Command {
     /// Refit a garment from the body it fits to another one.
     Refit(RefitArguments),
+    /// Compare the gradient of a refit's loss with differences of complete drapes.
+    CheckGradient(CheckGradientArguments),
     /// Drape a garment on a body.
     Drape(DrapeArguments),
     /// Tell what is in a garment or body file, and what is wrong with it.
@@ -42,37 +46,26 @@ pub enum Command {
 /// `dress refit`.
 #[derive(Debug, Args)]
 pub struct RefitArguments {
-    /// GarmentCode pattern (JSON), or drape in OBJ with its pattern as texture coordinates
-    /// [default: a T-shirt that is built in]
-    #[arg(long, value_name = "FILE", requires = "source_body")]
-    pub garment: Option<PathBuf>,
-    /// The body that the garment fits (OBJ, PLY, STL) [default: built in]
-    #[arg(long, value_name = "FILE", requires = "target_body")]
-    pub source_body: Option<PathBuf>,
-    /// The body that it shall fit, of any mesh and pose [default: built in]
-    #[arg(long, value_name = "FILE")]
-    pub target_body: Option<PathBuf>,
+    /// Garment, bodies, and how.
+    #[command(flatten)]
+    pub fitting: FittingArguments,
     /// Folder for the results
     #[arg(long, value_name = "FOLDER", default_value = "dress-out")]
     pub out: PathBuf,
-    /// What the cages that deform the panels can do
-    #[arg(long, value_name = "KIND")]
-    pub cage: Option<Cage>,
-    /// Let mirrored panels become unlike each other
-    #[arg(long)]
-    pub no_symmetry: bool,
     /// Pose of the result: the source body's, or the target body's own besides
     #[arg(long, value_name = "POSE", default_value = "source")]
     pub pose: PoseChoice,
-    /// The model by which bodies of different meshes or poses are made to correspond.
+}
+
+/// `dress check-gradient`.
+#[derive(Debug, Args)]
+pub struct CheckGradientArguments {
+    /// Garment, bodies, and how.
     #[command(flatten)]
-    pub model: ModelArguments,
-    /// How to read the files.
-    #[command(flatten)]
-    pub reading: ReadingArguments,
-    /// How to run.
-    #[command(flatten)]
-    pub running: RunningArguments,
+    pub fitting: FittingArguments,
+    /// Random directions along which to compare
+    #[arg(long, value_name = "N", default_value = "3")]
+    pub directions: NonZeroUsize,
 }
 
 /// `dress drape`.
@@ -174,15 +167,6 @@ pub enum PoseChoice {
     Source,
     /// That, and the target body's own
     Own,
-}
-
-/// [`CageKind`].
-#[derive(Clone, Copy, Debug, ValueEnum)]
-pub enum Cage {
-    /// Keeps all angles, as in the paper
-    Green,
-    /// May stretch and shear each panel as a whole, too
-    GreenAffine,
 }
 
 /// [`Solver`].
@@ -309,22 +293,6 @@ impl DrapeArguments {
     }
 }
 
-impl RefitArguments {
-    /// The parameters: the file's, overridden by the command line.
-    pub fn params(&self) -> Result<Params, BadInput> {
-        let mut params = self.reading.params()?;
-        match self.cage {
-            Some(Cage::Green) => params.refit.cage.kind = CageKind::Green,
-            Some(Cage::GreenAffine) => params.refit.cage.kind = CageKind::GreenAffine,
-            None => {}
-        }
-        if self.no_symmetry {
-            params.refit.symmetry = false;
-        }
-        Ok(params)
-    }
-}
-
 /// A length or scale.
 fn positive(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
@@ -337,6 +305,8 @@ fn positive(text: &str) -> Result<f64, String> {
 mod tests {
     use super::*;
     use clap::CommandFactory;
+    use dress_anyone::cage::CageKind;
+    use dress_anyone::descent::{Gradient, Optimizer};
 
     #[test]
     fn the_command_line_is_well_formed() {
@@ -350,15 +320,50 @@ mod tests {
         let Command::Refit(refit) = Arguments::parse_from(line.split_whitespace()).command else {
             panic!("not refit");
         };
-        let params = refit.params().expect("good parameters");
+        let params = refit.fitting.params().expect("good parameters");
         // 35 mm.
         assert!((params.read.resolution - 0.035).abs() < 1e-12);
         assert_eq!(params.read.panel_rotation, RotationOrder::Intrinsic);
         assert_eq!(params.refit.cage.kind, CageKind::Green);
         assert!(!params.refit.symmetry);
-        let body = refit.reading.body();
+        let body = refit.fitting.reading.body();
         assert_eq!(body.metres_per_unit, Some(0.0254));
         assert_eq!(body.up, Some(UpAxis::Z));
+    }
+
+    #[test]
+    fn the_papers_gradient_goes_with_the_papers_descent_unless_told() {
+        let chosen = |line: &str| {
+            let Command::Refit(refit) = Arguments::parse_from(line.split_whitespace()).command
+            else {
+                panic!("not refit");
+            };
+            let descent = refit
+                .fitting
+                .params()
+                .expect("good parameters")
+                .refit
+                .descent;
+            (descent.gradient, descent.optimizer)
+        };
+        let (equilibrium, trajectory) = (Gradient::Equilibrium, Gradient::Trajectory);
+        for (line, expected) in [
+            ("dress refit", (equilibrium, Optimizer::Lm)),
+            (
+                "dress refit --gradient trajectory",
+                (trajectory, Optimizer::Descent),
+            ),
+            (
+                "dress refit --gradient trajectory --optimizer lbfgs",
+                (trajectory, Optimizer::Lbfgs),
+            ),
+            (
+                "dress refit --optimizer descent",
+                (equilibrium, Optimizer::Descent),
+            ),
+        ] {
+            assert_eq!(chosen(line), expected, "{line}");
+        }
     }
 
     #[test]

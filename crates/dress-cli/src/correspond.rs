@@ -1,6 +1,6 @@
 //! The bodies of a refit made to correspond: as they are where they do, else by the body model.
 
-use crate::arguments::RefitArguments;
+use crate::body::arguments::ModelArguments;
 use crate::body::model;
 use crate::failure::Failure;
 use crate::progress::Progress;
@@ -36,7 +36,7 @@ pub enum How {
 
 /// Fits the model to both bodies unless they share topology and pose; tells which.
 pub fn correspond(
-    arguments: &RefitArguments,
+    model_arguments: &ModelArguments,
     names: [&Path; 2],
     source: Body,
     target: Body,
@@ -61,7 +61,7 @@ pub fn correspond(
         "different meshes: the body model is fitted to both"
     };
     note(progress, why);
-    let model = model(&arguments.model)?;
+    let model = model(model_arguments)?;
     let alike = make_alike(&model, &source, &target).map_err(|problems| {
         let bad = names
             .into_iter()

@@ -130,13 +130,20 @@ mod tests {
         let Command::Refit(refit) = Arguments::parse_from(["dress", "refit"]).command else {
             panic!("not refit");
         };
-        let options = refit.reading.garment(&refit.params().expect("defaults"));
+        let options = refit
+            .fitting
+            .reading
+            .garment(&refit.fitting.params().expect("defaults"));
         let garment = TSHIRT.garment(&options).expect("a good garment").garment;
         assert_eq!(
             (garment.name.as_str(), garment.pattern.panels.len()),
             ("tshirt", 6)
         );
-        let body = |input: Input<'_>| input.body(&refit.reading.body()).expect("a good body");
+        let body = |input: Input<'_>| {
+            input
+                .body(&refit.fitting.reading.body())
+                .expect("a good body")
+        };
         assert!(body(AVERAGE).shares_topology(&body(HEAVY)));
     }
 }

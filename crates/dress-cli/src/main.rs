@@ -10,9 +10,11 @@
 
 mod arguments;
 mod body;
+mod check_gradient;
 mod correspond;
 mod drape;
 mod failure;
+mod fitting;
 mod inputs;
 mod inspect;
 mod params;
@@ -53,8 +55,12 @@ fn main() -> ExitCode {
 fn run(command: &Command) -> Result<String, Failure> {
     match command {
         Command::Refit(arguments) => {
-            set_threads(&arguments.running)?;
+            set_threads(&arguments.fitting.running)?;
             refit::run(arguments)
+        }
+        Command::CheckGradient(arguments) => {
+            set_threads(&arguments.fitting.running)?;
+            check_gradient::run(arguments)
         }
         Command::Drape(arguments) => {
             set_threads(&arguments.running)?;

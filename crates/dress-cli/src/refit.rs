@@ -1,9 +1,10 @@
 //! `dress refit`.
 
 use crate::arguments::{PoseChoice, RefitArguments};
-use crate::correspond::{How, correspond};
+use crate::correspond::How;
 use crate::failure::Failure;
-use crate::inputs::{AVERAGE, Gathering, HEAVY, Input, InputReport, TSHIRT};
+use crate::fitting::Inputs;
+use crate::inputs::InputReport;
 use crate::params::Params;
 use crate::picture::View;
 use crate::progress::{Progress, stop_on_ctrl_c};
@@ -13,34 +14,20 @@ use anyhow::Context;
 use dress_anyone::body::Body;
 use dress_anyone::garment::Garment;
 use dress_anyone::geometry::{TriangleMesh, Vec3};
-use dress_anyone::io::garment::Loaded;
-use dress_anyone::io::output::{Output, check_writable};
+use dress_anyone::io::output::Output;
 use dress_anyone::io::{body, garment_obj, garmentcode, obj, svg};
-use dress_anyone::problem::BadInput;
 use dress_anyone::refit::dress::drape_on;
 use dress_anyone::refit::{Refit, RefitError, accept, refit};
 use dress_anyone::report::Report;
 use dress_anyone::transfer::target_shape;
 use serde::Serialize;
-use std::path::Path;
 use std::sync::atomic::Ordering;
-
-/// Everything read.
-struct Inputs<'a> {
-    names: [Input<'a>; 3],
-    params: Params,
-    loaded: Loaded,
-    source: Body,
-    target: Body,
-    /// The target in its own pose, and how the bodies came to correspond.
-    target_own: TriangleMesh,
-    how: How,
-}
 
 /// Refits; what to say about it in the end.
 pub fn run(arguments: &RefitArguments) -> Result<String, Failure> {
-    let mut progress = Progress::new(arguments.running.quiet);
-    let inputs = read(arguments, &mut progress)?;
+    let quiet = arguments.fitting.running.quiet;
+    let mut progress = Progress::new(quiet);
+    let inputs = Inputs::read(&arguments.fitting, Some(&arguments.out), &mut progress)?;
     let stop = stop_on_ctrl_c().context("Ctrl-C cannot be listened to")?;
     let refitted = refit(
         &inputs.loaded.garment,
@@ -53,53 +40,12 @@ pub fn run(arguments: &RefitArguments) -> Result<String, Failure> {
         },
     );
     progress.close();
-    let refitted = refitted.map_err(|error| match error {
-        RefitError::Garment(problems) => {
-            BadInput::new(Path::new(&inputs.names[0].name()), problems).into()
-        }
-        other => Failure::from(other),
-    })?;
+    let refitted = refitted.map_err(|error| inputs.failure(error))?;
     results(arguments, &inputs, &refitted)?.write()?;
-    if arguments.running.quiet {
+    if quiet {
         return Ok(String::new());
     }
     Ok(summary::of(&refitted.report, &arguments.out))
-}
-
-/// Reads all inputs before complaining of any.
-fn read<'a>(arguments: &'a RefitArguments, progress: &mut Progress) -> Result<Inputs<'a>, Failure> {
-    let names = [
-        Input::or(arguments.garment.as_ref(), TSHIRT),
-        Input::or(arguments.source_body.as_ref(), AVERAGE),
-        Input::or(arguments.target_body.as_ref(), HEAVY),
-    ];
-    let mut gathering = Gathering::default();
-    let params = gathering.take(arguments.params());
-    let options = arguments
-        .reading
-        .garment(params.as_ref().unwrap_or(&Params::default()));
-    let loaded = gathering.take(names[0].garment(&options));
-    let [source, target] =
-        [names[1], names[2]].map(|name| gathering.take(name.body(&arguments.reading.body())));
-    gathering.take(check_writable(&arguments.out));
-    gathering.finish()?;
-    let all = params.zip(loaded).zip(source.zip(target));
-    let ((params, loaded), (source, target)) = all.expect("nothing was wrong with any of them");
-    progress.notes(&loaded.garment.name, &loaded.notes);
-    progress.notes(&source.name, &source.notes);
-    progress.notes(&target.name, &target.notes);
-    let files = [names[1], names[2]].map(|name| name.name());
-    let files = [Path::new(&files[0]), Path::new(&files[1])];
-    let alike = correspond(arguments, files, source, target, progress)?;
-    Ok(Inputs {
-        names,
-        params,
-        loaded,
-        source: alike.source,
-        target: alike.target,
-        target_own: alike.target_own,
-        how: alike.how,
-    })
 }
 
 /// All files of a refit, in the unit and axes of the target body's.

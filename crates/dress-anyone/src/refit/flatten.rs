@@ -7,7 +7,8 @@
 //! seam terms of the loss), R anew in every round, as in as-rigid-as-possible mapping (Sorkine &
 //! Alexa 2007). No drape is needed. Not in the paper, whose initial guess is a uniform scale.
 
-use super::search::{can_be_cut, quality_floor, slope, without};
+use super::search::guards::{can_be_cut, quality_floor, without};
+use super::search::newton::slope;
 use crate::cage::Cages;
 use crate::descent::Model;
 use crate::geometry::{Mat2, Vec2, Vec3};

@@ -180,7 +180,7 @@ fn gather<S: Surface>(
     );
     let v = vec![Vec3::zeros(); x.len()];
     let mut state = State { x, v };
-    let steps = (step_params.time / step_params.dt).ceil() as usize;
+    let steps = step_params.steps();
     for step in 0..2 * steps {
         let enough = step >= steps && !stepper.tangled();
         if enough || !observe(DrapeProgress::Gathering { step, steps }) {

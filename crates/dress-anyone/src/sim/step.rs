@@ -4,10 +4,16 @@
 //! contact and holds in a fixed order, then v ← τ (x − x_n)/Δt. It brings placed panels together;
 //! at usual sweep counts its rest state is centimetres too long (METHOD §1.5), so the static solve
 //! follows.
+//!
+//! A step can be recorded on a [`Tape`] and walked back through: [`pull_back`] is its exact adjoint.
+
+pub mod pull_back;
 
 use super::cloth::{Cloth, ContactPoint, GRAVITY, Rest};
 use super::energy::contact::{ContactParams, Surface};
-use super::energy::membrane::{Elasticity, constraint};
+use super::energy::membrane::{
+    Elasticity, Mat3x2, constraint, constraint_gradient, constraint_mass,
+};
 use super::layers::Watch;
 use crate::geometry::{Mat3, Vec3};
 use serde::{Deserialize, Serialize};
@@ -47,6 +53,13 @@ impl Default for StepParams {
     }
 }
 
+impl StepParams {
+    /// Steps that make up the time.
+    pub fn steps(&self) -> usize {
+        (self.time / self.dt).ceil() as usize
+    }
+}
+
 /// Positions and velocities.
 #[derive(Clone, Debug)]
 pub struct State {
@@ -75,6 +88,7 @@ pub struct Stepper<'a, S> {
 }
 
 /// A contact point near the body: its contact linearised once per step.
+#[derive(Clone, Copy, Debug)]
 struct Touch {
     point: ContactPoint,
     normal: Vec3,
@@ -82,6 +96,24 @@ struct Touch {
     offset: f64,
     alpha_tilde: f64,
     lambda: f64,
+}
+
+/// What one step did, visit by visit: enough to walk back through it.
+#[derive(Clone, Debug, Default)]
+pub struct Tape {
+    /// Positions before the step \[m\].
+    before: Vec<Vec3>,
+    /// Positions after the sweeps, before moves are shortened \[m\].
+    swept: Vec<Vec3>,
+    /// F and Δλ of each visit to a triangle; none where its system could not be solved.
+    membrane: Vec<Option<(Mat3x2, Vec3)>>,
+    /// Δλ of each visit to a hinge.
+    bend: Vec<Vec3>,
+    /// Δλ of each visit to a hold.
+    holds: Vec<f64>,
+    /// λ after each visit to a contact.
+    contact: Vec<f64>,
+    touching: Vec<Touch>,
 }
 
 impl<'a, S: Surface> Stepper<'a, S> {
@@ -116,16 +148,27 @@ impl<'a, S: Surface> Stepper<'a, S> {
 
     /// Advances `state` by Δt under gravity and a `pressure` \[Pa\] from within.
     pub fn step(&mut self, state: &mut State, pressure: f64) {
-        let dt = self.params.dt;
-        let before = state.x.clone();
-        let mut acceleration = vec![GRAVITY; state.x.len()];
+        let mut wanted = vec![GRAVITY; state.x.len()];
         for t in &self.cloth.outward {
-            let [a, b, c] = t.map(|v| before[v as usize]);
+            let [a, b, c] = t.map(|v| state.x[v as usize]);
             let push = (b - a).cross(&(c - a)) * (pressure / 6.0);
             for v in t.map(|v| v as usize) {
-                acceleration[v] += push * self.w[v];
+                wanted[v] += push * self.w[v];
             }
         }
+        self.advance(state, &wanted, None);
+    }
+
+    /// A [`Self::step`] without pressure, recorded on `tape`.
+    pub fn record(&mut self, state: &mut State, tape: &mut Tape) {
+        let gravity = vec![GRAVITY; state.x.len()];
+        tape.clear();
+        self.advance(state, &gravity, Some(tape));
+    }
+
+    fn advance(&mut self, state: &mut State, acceleration: &[Vec3], mut tape: Option<&mut Tape>) {
+        let dt = self.params.dt;
+        let before = state.x.clone();
         for ((x, v), g) in state.x.iter_mut().zip(&state.v).zip(acceleration) {
             *x += *v * dt + g * (dt * dt);
         }
@@ -136,13 +179,17 @@ impl<'a, S: Surface> Stepper<'a, S> {
         let wish: Vec<Vec3> = state.x.iter().zip(&before).map(|(x, b)| x - b).collect();
         let mut apart = self.watch.constraints(&before, &wish, 1.0 / (dt * dt));
         for _ in 0..self.params.sweeps {
-            self.sweep_membrane(&mut state.x);
-            self.sweep_bend(&mut state.x);
-            self.sweep_holds(&mut state.x);
+            self.sweep_membrane(&mut state.x, tape.as_deref_mut());
+            self.sweep_bend(&mut state.x, tape.as_deref_mut());
+            self.sweep_holds(&mut state.x, tape.as_deref_mut());
             self.watch.sweep(&mut apart, &self.w, &mut state.x);
-            self.sweep_contact(&mut touching, &mut state.x);
+            self.sweep_contact(&mut touching, &mut state.x, tape.as_deref_mut());
         }
-        let tau = (-self.params.drag * dt).exp();
+        if let Some(tape) = tape {
+            tape.before.clone_from(&before);
+            tape.swept.clone_from(&state.x);
+            tape.touching = touching;
+        }
         let farthest = self.params.speed * dt;
         for (x, start) in state.x.iter_mut().zip(&before) {
             let moved = *x - start;
@@ -153,34 +200,40 @@ impl<'a, S: Surface> Stepper<'a, S> {
         }
         self.watch.restrain(&before, &mut state.x);
         for ((x, v), start) in state.x.iter().zip(&mut state.v).zip(&before) {
-            *v = (x - start) * (tau / dt);
+            *v = (x - start) * self.kept();
         }
     }
 
-    fn sweep_membrane(&mut self, x: &mut [Vec3]) {
+    /// τ/Δt \[1/s\]: velocity kept per move.
+    fn kept(&self) -> f64 {
+        (-self.params.drag * self.params.dt).exp() / self.params.dt
+    }
+
+    fn sweep_membrane(&mut self, x: &mut [Vec3], mut tape: Option<&mut Tape>) {
         for (e, t) in self.cloth.triangles.iter().enumerate() {
-            let corners = t.map(|a| x[a as usize]);
-            let w = t.map(|a| self.w[a as usize]);
             let rest = &self.rest.triangles[e];
-            let (c, j) = constraint(rest, corners);
+            let w = t.map(|a| self.w[a as usize]);
+            let f = rest.gradient_of(t.map(|a| x[a as usize]));
             let alpha_tilde = self.compliance / rest.area;
-            let mut system = alpha_tilde;
-            for a in 0..3 {
-                system += j[a] * j[a].transpose() * w[a];
-            }
+            let system = alpha_tilde + constraint_mass(rest, &f, w);
             let lambda = &mut self.lambda_membrane[e];
-            let right = -c - alpha_tilde * *lambda;
-            let Some(delta) = solve_symmetric(&system, &right) else {
+            let right = -constraint(&f) - alpha_tilde * *lambda;
+            let delta = solve_symmetric(&system, &right);
+            if let Some(tape) = &mut tape {
+                tape.membrane.push(delta.map(|delta| (f, delta)));
+            }
+            let Some(delta) = delta else {
                 continue;
             };
             *lambda += delta;
-            for a in 0..3 {
-                x[t[a] as usize] += j[a].transpose() * delta * w[a];
+            let y = constraint_gradient(&f, &delta);
+            for ((a, b), w) in t.iter().zip(rest.gradients()).zip(w) {
+                x[*a as usize] += y * (b * w);
             }
         }
     }
 
-    fn sweep_bend(&mut self, x: &mut [Vec3]) {
+    fn sweep_bend(&mut self, x: &mut [Vec3], mut tape: Option<&mut Tape>) {
         let per_time = 1.0 / (self.params.dt * self.params.dt);
         for (e, hinge) in self.cloth.hinges.iter().enumerate() {
             let rest = &self.rest.hinges[e];
@@ -196,10 +249,13 @@ impl<'a, S: Surface> Stepper<'a, S> {
             for (a, k) in hinge.vertices.iter().zip(rest.k) {
                 x[*a as usize] += delta * (self.w[*a as usize] * k);
             }
+            if let Some(tape) = &mut tape {
+                tape.bend.push(delta);
+            }
         }
     }
 
-    fn sweep_holds(&mut self, x: &mut [Vec3]) {
+    fn sweep_holds(&mut self, x: &mut [Vec3], mut tape: Option<&mut Tape>) {
         let per_time = 1.0 / (self.params.dt * self.params.dt);
         for (hold, lambda) in self.cloth.holds.iter().zip(&mut self.lambda_hold) {
             let a = hold.vertex as usize;
@@ -207,26 +263,37 @@ impl<'a, S: Surface> Stepper<'a, S> {
             let delta = -(x[a].y - hold.height + alpha_tilde * *lambda) / (self.w[a] + alpha_tilde);
             *lambda += delta;
             x[a].y += self.w[a] * delta;
+            if let Some(tape) = &mut tape {
+                tape.holds.push(delta);
+            }
         }
     }
 
-    fn sweep_contact(&self, touching: &mut [Touch], x: &mut [Vec3]) {
+    fn sweep_contact(&self, touching: &mut [Touch], x: &mut [Vec3], mut tape: Option<&mut Tape>) {
         for touch in touching {
             let [a, b] = touch.point.ends.map(|a| a as usize);
-            // ∂p/∂x of an end is ½; a vertex is both its ends.
-            let w = if a == b {
-                self.w[a]
-            } else {
-                0.25 * (self.w[a] + self.w[b])
-            };
             let c = touch.normal.dot(&touch.point.at(x)) - touch.offset;
-            let wanted =
-                touch.lambda + (-c - touch.alpha_tilde * touch.lambda) / (w + touch.alpha_tilde);
+            let wanted = touch.lambda
+                + (-c - touch.alpha_tilde * touch.lambda)
+                    / (self.inverse_mass(touch) + touch.alpha_tilde);
             let delta = wanted.max(0.0) - touch.lambda;
             touch.lambda += delta;
             for a in [a, b] {
                 x[a] += touch.normal * (0.5 * self.w[a] * delta);
             }
+            if let Some(tape) = &mut tape {
+                tape.contact.push(touch.lambda);
+            }
+        }
+    }
+
+    /// Of a contact point \[1/kg\]: ∂p/∂x of an end is ½; a vertex is both its ends.
+    fn inverse_mass(&self, touch: &Touch) -> f64 {
+        let [a, b] = touch.point.ends.map(|a| a as usize);
+        if a == b {
+            self.w[a]
+        } else {
+            0.25 * (self.w[a] + self.w[b])
         }
     }
 
@@ -249,6 +316,16 @@ impl<'a, S: Surface> Stepper<'a, S> {
             })
         };
         self.cloth.contacts.iter().filter_map(touch).collect()
+    }
+}
+
+impl Tape {
+    /// Forgets what is on it, and keeps the room.
+    fn clear(&mut self) {
+        self.membrane.clear();
+        self.bend.clear();
+        self.holds.clear();
+        self.contact.clear();
     }
 }
 

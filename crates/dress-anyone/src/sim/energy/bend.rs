@@ -77,6 +77,32 @@ impl RestHinge {
         }
     }
 
+    /// Gradient by the rest corners of both sides of a function whose gradients by k and by the
+    /// stiffness are given.
+    pub fn pull_back(
+        &self,
+        corners: [[Vec2; 3]; 2],
+        by_k: [f64; 4],
+        by_stiffness: f64,
+    ) -> [[Vec2; 3]; 2] {
+        let sides = corners.map(Side::new);
+        let mean = 0.5 * (sides[0].length + sides[1].length);
+        let by_areas = -by_stiffness * self.stiffness / (sides[0].area + sides[1].area);
+        let by_opposite: [f64; 2] = std::array::from_fn(|i| {
+            let t = sides[i].foot;
+            by_k[2 + i] - (1.0 - t) * by_k[0] - t * by_k[1]
+        });
+        let opposite = [self.k[2], self.k[3]];
+        let by_mean: f64 = (0..2).map(|i| by_opposite[i] * opposite[i] / mean).sum();
+        std::array::from_fn(|i| {
+            let side = &sides[i];
+            let length = by_opposite[i] * opposite[i] / side.length + 0.5 * by_mean;
+            let area = by_areas - by_opposite[i] * opposite[i] / side.area;
+            let foot = opposite[i] * (by_k[0] - by_k[1]);
+            side.pull_back(length, area, foot)
+        })
+    }
+
     /// c \[m\].
     pub fn curvature_vector(&self, x: [Vec3; 4]) -> Vec3 {
         (0..4).map(|a| x[a] * self.k[a]).sum()
@@ -109,26 +135,11 @@ pub fn rest_pull_back(
     lambda: [Vec3; 4],
 ) -> [[Vec2; 3]; 2] {
     let hinge = RestHinge::new(corners, rigidity);
-    let sides = corners.map(Side::new);
-    let mean = 0.5 * (sides[0].length + sides[1].length);
     let (c, c_lambda) = (hinge.curvature_vector(x), hinge.curvature_vector(lambda));
-    // λ·f = −H c·c_λ; gradients by k_a, then by length, area and foot of each side.
-    let by_k: [f64; 4] =
+    // λ·f = −H c·c_λ.
+    let by_k =
         std::array::from_fn(|a| -hinge.stiffness * (x[a].dot(&c_lambda) + lambda[a].dot(&c)));
-    let by_areas = hinge.stiffness * c.dot(&c_lambda) / (sides[0].area + sides[1].area);
-    let by_opposite: [f64; 2] = std::array::from_fn(|i| {
-        let t = sides[i].foot;
-        by_k[2 + i] - (1.0 - t) * by_k[0] - t * by_k[1]
-    });
-    let opposite = [hinge.k[2], hinge.k[3]];
-    let by_mean: f64 = (0..2).map(|i| by_opposite[i] * opposite[i] / mean).sum();
-    std::array::from_fn(|i| {
-        let side = &sides[i];
-        let length = by_opposite[i] * opposite[i] / side.length + 0.5 * by_mean;
-        let area = by_areas - by_opposite[i] * opposite[i] / side.area;
-        let foot = opposite[i] * (by_k[0] - by_k[1]);
-        side.pull_back(length, area, foot)
-    })
+    hinge.pull_back(corners, by_k, -c.dot(&c_lambda))
 }
 
 /// Change of the forces under a motion `delta` of the rest corners of both sides, at fixed x.

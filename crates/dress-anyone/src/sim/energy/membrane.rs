@@ -6,7 +6,7 @@
 
 use crate::garment::Fabric;
 use crate::geometry::{Mat2, Mat3, Vec2, Vec3};
-use nalgebra::{Matrix3x2, Vector3};
+use nalgebra::Matrix3x2;
 
 /// 3×2: the deformation gradient and everything of its shape.
 pub type Mat3x2 = Matrix3x2<f64>;
@@ -67,6 +67,14 @@ impl RestTriangle {
             inverse: adjugate / doubled,
             area: 0.5 * doubled,
         }
+    }
+
+    /// Gradient by the corners of a function whose gradients by `inverse` and `area` are given.
+    pub fn pull_back(&self, inverse: &Mat2, area: f64) -> [Vec2; 3] {
+        let turned = self.inverse.transpose();
+        let edges = turned * (self.area * area) - turned * inverse * turned;
+        let (g1, g2) = (edges.column(0).into_owned(), edges.column(1).into_owned());
+        [-g1 - g2, g1, g2]
     }
 
     /// Gradients of the three hat functions \[1/m\].
@@ -156,23 +164,45 @@ fn positive_part(s: &Mat2) -> Mat2 {
     (Mat2::identity() + Mat2::new(half.x, half.y, half.y, -half.x) / radius) * (0.5 * high)
 }
 
-/// The constraint C = (ε_uu, ε_vv, 2ε_uv) and its gradients ∂C/∂x_a (rows: entries of C).
-pub fn constraint(rest: &RestTriangle, x: [Vec3; 3]) -> (Vector3<f64>, [Mat3; 3]) {
-    let f = rest.gradient_of(x);
-    let (fu, fv) = (f.column(0).into_owned(), f.column(1).into_owned());
-    let c = Vector3::new(
+/// The constraint C = (ε_uu, ε_vv, 2ε_uv) of a deformation gradient.
+pub fn constraint(f: &Mat3x2) -> Vec3 {
+    let (fu, fv) = (f.column(0), f.column(1));
+    Vec3::new(
         0.5 * (fu.dot(&fu) - 1.0),
         0.5 * (fv.dot(&fv) - 1.0),
         fu.dot(&fv),
-    );
-    let rows = rest.gradients().map(|b| {
-        Mat3::from_rows(&[
-            (fu * b.x).transpose(),
-            (fv * b.y).transpose(),
-            (fv * b.x + fu * b.y).transpose(),
-        ])
-    });
-    (c, rows)
+    )
+}
+
+/// Y with (∂C/∂x_a)ᵀ y = Y b_a for every corner a: F times y as a symmetric matrix.
+pub fn constraint_gradient(f: &Mat3x2, y: &Vec3) -> Mat3x2 {
+    f * symmetric(y)
+}
+
+/// Σ_a w_a (∂C/∂x_a)(∂C/∂x_a)ᵀ for the weights `w` of the corners.
+pub fn constraint_mass(rest: &RestTriangle, f: &Mat3x2, w: [f64; 3]) -> Mat3 {
+    let [a, b, c] = rest.gradients();
+    let b = a * a.transpose() * w[0] + b * b.transpose() * w[1] + c * c.transpose() * w[2];
+    let g = f.transpose() * f;
+    let uu_uv = b.m11 * g.m12 + b.m12 * g.m11;
+    let vv_uv = b.m12 * g.m22 + b.m22 * g.m12;
+    let shear = b.m11 * g.m22 + 2.0 * b.m12 * g.m12 + b.m22 * g.m11;
+    Mat3::new(
+        b.m11 * g.m11,
+        b.m12 * g.m12,
+        uu_uv,
+        b.m12 * g.m12,
+        b.m22 * g.m22,
+        vv_uv,
+        uu_uv,
+        vv_uv,
+        shear,
+    )
+}
+
+/// (y₀, y₁, y₂) as [[y₀, y₂], [y₂, y₁]].
+pub fn symmetric(y: &Vec3) -> Mat2 {
+    Mat2::new(y.x, y.z, y.z, y.y)
 }
 
 /// Gradient of λ·f by the rest corners x̄ (METHOD: W = −λ·f = Ā S:e_L), where `weight` is
@@ -316,7 +346,8 @@ mod tests {
     fn the_constraint_form_is_the_same_energy() {
         let rest = RestTriangle::new(rest_corners());
         let (x, d) = scene(3);
-        let (c, j) = constraint(&rest, x);
+        let f = rest.gradient_of(x);
+        let c = constraint(&f);
         let stress = ANISOTROPIC.stress(&Mat2::new(c[0], 0.5 * c[2], 0.5 * c[2], c[1]));
         let quadratic = c[0] * stress.m11 + c[1] * stress.m22 + c[2] * stress.m12;
         assert_relative_eq!(
@@ -324,16 +355,40 @@ mod tests {
             energy(&rest, &ANISOTROPIC, x),
             max_relative = 1e-12
         );
+        let j = |row: usize| {
+            let y = constraint_gradient(&f, &Vec3::ith(row, 1.0));
+            rest.gradients().map(|b| y * b)
+        };
+        let w = [0.3, 0.8, 0.5];
+        let mass = constraint_mass(&rest, &f, w);
         for row in 0..3 {
-            let slope = (0..3).map(|a| (j[a] * d[a])[row]).sum();
             assert_derivative(
-                |s| constraint(&rest, moved(x, d, s)).0[row],
-                slope,
+                |s| constraint(&rest.gradient_of(moved(x, d, s)))[row],
+                dot(j(row), d),
                 1e-5,
                 1.0,
                 1e-8,
             );
+            for column in 0..3 {
+                let products = j(row).into_iter().zip(j(column)).zip(w);
+                let sum: f64 = products.map(|((p, q), w)| w * p.dot(&q)).sum();
+                assert_relative_eq!(mass[(row, column)], sum, max_relative = 1e-12);
+            }
         }
+    }
+
+    #[test]
+    fn a_triangle_at_rest_pulls_back_to_its_corners() {
+        let hats = (Mat2::new(0.3, -0.7, 0.2, 0.9), 0.4);
+        let delta: [Vec2; 3] = std::array::from_fn(|a| Vec2::new(noise(3 * a), noise(9 + 5 * a)));
+        let value = |s: f64| {
+            let c = rest_corners();
+            let rest = RestTriangle::new(std::array::from_fn(|a| c[a] + delta[a] * s));
+            rest.inverse.dot(&hats.0) + rest.area * hats.1
+        };
+        let pulled = RestTriangle::new(rest_corners()).pull_back(&hats.0, hats.1);
+        let slope: f64 = pulled.iter().zip(&delta).map(|(g, d)| g.dot(d)).sum();
+        assert_derivative(value, slope, 1e-5, 1e-3, 1e-8);
     }
 
     #[test]

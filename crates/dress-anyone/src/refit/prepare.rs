@@ -1,0 +1,147 @@
+//! What a search works on: the target shape (paper §4.2), cages (§4.3) with their symmetry (§4.5), the
+//! initial scale (§4.6), the body to drape on and the loss (§4.4).
+
+use super::dress::holds;
+use super::search::{self, Search};
+use super::{Clock, Observer, RefitError, RefitParams, drape_to_rest};
+use crate::body::Body;
+use crate::body::distance_field::DistanceField;
+use crate::cage::Cages;
+use crate::descent::Gradient;
+use crate::garment::Garment;
+use crate::geometry::{Vec2, Vec3};
+use crate::loss::Losses;
+use crate::pattern::symmetry::Symmetry;
+use crate::sim::{Assembly, Cloth, Scene};
+use crate::transfer::target_shape;
+
+/// Everything that follows from garment, bodies and parameters, and that no search changes.
+pub(super) struct Prepared<'a> {
+    pub(super) garment: &'a Garment,
+    target: &'a Body,
+    params: &'a RefitParams,
+    /// The garment on the source body \[m\].
+    pub(super) source_drape: Vec<Vec3>,
+    /// The shape to aim for \[m\].
+    pub(super) x_star: Vec<Vec3>,
+    pub(super) symmetry: Option<Symmetry>,
+    pub(super) cages: Cages,
+    /// Scale of the initial guess \[–\].
+    pub(super) scale: f64,
+    cloth: Cloth,
+    assembly: Assembly,
+    surface: DistanceField,
+    pub(super) losses: Losses,
+    /// ∂x̄ along each unknown, `[unknown][pattern vertex]`.
+    pub(super) motions: Vec<Vec<Vec2>>,
+}
+
+impl<'a> Prepared<'a> {
+    pub(super) fn new(
+        garment: &'a Garment,
+        source: &Body,
+        target: &'a Body,
+        params: &'a RefitParams,
+        clock: &mut Clock,
+        observe: &mut Observer<'_>,
+    ) -> Result<Self, RefitError> {
+        let problems = params.descent.problems();
+        if !problems.is_empty() {
+            return Err(RefitError::Garment(problems));
+        }
+        let mesh = &garment.mesh;
+
+        // The drape on the source body: the file's own, or from the placed panels.
+        clock.stage("source drape", observe);
+        let source_drape = match &garment.drape {
+            Some(x) => x.clone(),
+            None => drape_to_rest(garment, source, params, observe)?,
+        };
+
+        // §4.2: the shape to aim for.
+        clock.stage("target shape", observe);
+        let outward = mesh.outward_triangles();
+        let x_star =
+            target_shape(&source_drape, &outward, source, target, &params.transfer)?.x_star;
+
+        // §4.3, §4.5: the unknowns are the control points of one cage per panel.
+        clock.stage("cages", observe);
+        let symmetry = params
+            .symmetry
+            .then(|| Symmetry::detect(&garment.pattern, mesh, garment.drape.as_deref()));
+        let cages = Cages::enclose(&garment.pattern, mesh, symmetry.as_ref(), &params.cage)
+            .map_err(RefitError::Garment)?;
+
+        clock.stage("target body", observe);
+        let surface =
+            DistanceField::new(&target.mesh, DistanceField::SPACING, DistanceField::OUTER);
+        let mut cloth = Cloth::new(mesh, &params.fabric);
+        cloth.holds = holds(garment, &x_star, &params.hold);
+        Ok(Self {
+            garment,
+            target,
+            params,
+            scale: initial_scale(garment, &source_drape, &x_star),
+            assembly: Assembly::new(&cloth),
+            losses: Losses::new(&garment.pattern, mesh, &x_star, &params.loss),
+            motions: search::newton::motions(&cages, mesh),
+            source_drape,
+            x_star,
+            symmetry,
+            cages,
+            cloth,
+            surface,
+        })
+    }
+
+    /// The cloth on the target body.
+    pub(super) fn scene(&self) -> Scene<'_, DistanceField> {
+        Scene {
+            cloth: &self.cloth,
+            assembly: &self.assembly,
+            surface: &self.surface,
+            params: &self.params.sim,
+        }
+    }
+
+    /// The search, ready to run in this scene.
+    pub(super) fn search<'s>(
+        &'s self,
+        scene: &'s Scene<'s, DistanceField>,
+    ) -> Search<'s, DistanceField> {
+        Search {
+            mesh: &self.garment.mesh,
+            cages: &self.cages,
+            losses: &self.losses,
+            scene,
+            x_star: &self.x_star,
+            params: &self.params.descent,
+            body: &self.target.name,
+            motions: &self.motions,
+            // Time steps end elsewhere from every start: starts are not to be compared.
+            fresh_starts: match self.params.descent.gradient {
+                Gradient::Equilibrium => search::FRESH_STARTS,
+                Gradient::Trajectory => 0,
+            },
+        }
+    }
+
+    /// The unknowns of the scaled reference.
+    pub(super) fn initial(&self) -> Vec<f64> {
+        self.cages.scaled(self.scale)
+    }
+}
+
+/// The uniform scale of the initial guess (§4.6, corrected): √ of the growth of the cloth's area
+/// from drape to target, so that stretch already in the drape does not count as size.
+fn initial_scale(garment: &Garment, drape: &[Vec3], x_star: &[Vec3]) -> f64 {
+    let triangles = garment.mesh.cloth_triangles();
+    let area = |x: &[Vec3]| -> f64 {
+        let doubled = |t: &[u32; 3]| {
+            let [a, b, c] = t.map(|v| x[v as usize]);
+            (b - a).cross(&(c - a)).norm()
+        };
+        triangles.iter().map(doubled).sum()
+    };
+    (area(x_star) / area(drape)).sqrt().clamp(0.3, 3.0)
+}

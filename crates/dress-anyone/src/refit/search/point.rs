@@ -1,0 +1,214 @@
+//! Patterns tried in a search: their drape, by the static solve or by the paper's time steps, their
+//! loss, and — once accepted — its gradient.
+
+use super::{Run, Search};
+use crate::descent::Gradient;
+use crate::geometry::{Vec2, Vec3};
+use crate::loss::Loss;
+use crate::refit::{Progress, RefitError};
+use crate::sim::drape::Differentiable;
+use crate::sim::energy::contact::Surface;
+use crate::sim::equilibrium::RestStatus;
+use crate::sim::{Start, Trajectory, drape};
+use nalgebra::DVector;
+
+/// Where a drape ended, with what its derivative needs.
+pub(in crate::refit) enum End<'a, S> {
+    /// At rest.
+    Rest(Box<Differentiable<'a>>),
+    /// Where the time steps left it.
+    Path(Box<Trajectory<'a, S>>),
+}
+
+/// Why there is no drape to speak of.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::refit) struct Failed {
+    /// How the search for it ended.
+    pub(in crate::refit) status: RestStatus,
+    /// ‖f‖/(‖m‖|g|).
+    pub(in crate::refit) residual: f64,
+}
+
+/// A pattern tried, and its drape.
+pub(in crate::refit) struct Candidate<'a, S> {
+    pub(super) zeta: Vec<f64>,
+    pub(in crate::refit) end: End<'a, S>,
+    pub(super) loss: Loss,
+    /// Weighted loss with the cages' priors.
+    pub(in crate::refit) total: f64,
+}
+
+/// A pattern accepted.
+pub(super) struct Point<'a> {
+    pub(super) zeta: Vec<f64>,
+    pub(super) x: Vec<Vec3>,
+    pub(super) x_bar: Vec<Vec2>,
+    pub(super) loss: Loss,
+    pub(super) total: f64,
+    /// ∂L/∂ζ \[1/m\].
+    pub(super) gradient: DVector<f64>,
+    /// ‖λ‖∞ of the equilibrium's adjoint; ‖x̂‖ at most over the last of the trajectory's.
+    pub(super) adjoint_norm: f64,
+    pub(super) residual: f64,
+    pub(super) shift: f64,
+    /// The state of rest; none with time steps, whose way is forgotten.
+    pub(super) state: Option<Box<Differentiable<'a>>>,
+}
+
+impl Failed {
+    /// The failure, told of the body called so.
+    pub(in crate::refit) fn on(self, body: &str) -> RefitError {
+        if self.status == RestStatus::Stopped {
+            return RefitError::Stopped;
+        }
+        RefitError::NotAtRest {
+            body: body.to_owned(),
+            status: self.status,
+            residual: self.residual,
+        }
+    }
+}
+
+impl<S: Surface> End<'_, S> {
+    /// Positions \[m\].
+    pub(in crate::refit) fn x(&self) -> &[Vec3] {
+        match self {
+            Self::Rest(state) => &state.drape.x,
+            Self::Path(trajectory) => trajectory.x(),
+        }
+    }
+
+    /// The rest shape \[m\].
+    fn x_bar(&self) -> &[Vec2] {
+        match self {
+            Self::Rest(state) => &state.drape.x_bar,
+            Self::Path(trajectory) => trajectory.x_bar(),
+        }
+    }
+
+    /// ‖f‖/(‖m‖|g|).
+    pub(in crate::refit) fn residual(&self) -> f64 {
+        match self {
+            Self::Rest(state) => state.drape.residual,
+            Self::Path(trajectory) => trajectory.residual(),
+        }
+    }
+
+    /// (∂x/∂x̄)ᵀ x̂, and how large the adjoint grew.
+    fn pull_back(&self, x_hat: &[Vec3]) -> (Vec<Vec2>, f64) {
+        match self {
+            Self::Rest(state) => {
+                let (hat, lambda) = state.pull_back(x_hat);
+                (hat, lambda.iter().map(Vec3::norm).fold(0.0, f64::max))
+            }
+            Self::Path(trajectory) => {
+                let hat = trajectory.pull_back(x_hat);
+                (hat.x_bar, hat.growth)
+            }
+        }
+    }
+}
+
+impl<'s, S: Surface> Search<'s, S> {
+    /// The pattern of the unknowns `zeta`, draped from a nearby start, and its loss.
+    pub(in crate::refit) fn candidate(
+        &self,
+        zeta: Vec<f64>,
+        start: Vec<Vec3>,
+        run: &mut Run<'_, '_>,
+    ) -> Result<Candidate<'s, S>, Failed> {
+        let x_bar = self.cages.deform(&zeta);
+        run.drapes += 1;
+        let end = match self.params.gradient {
+            Gradient::Equilibrium => self.rest(&x_bar, start, run)?,
+            Gradient::Trajectory => self.path(&x_bar, start, run)?,
+        };
+        let loss = self.losses.evaluate(end.x(), &x_bar);
+        let priors = self.priors(&zeta);
+        let total = loss.total + priors.iter().map(|p| p.value * p.value).sum::<f64>();
+        Ok(Candidate {
+            zeta,
+            end,
+            loss,
+            total,
+        })
+    }
+
+    /// The drape at rest, polished.
+    fn rest(
+        &self,
+        x_bar: &[Vec2],
+        start: Vec<Vec3>,
+        run: &mut Run<'_, '_>,
+    ) -> Result<End<'s, S>, Failed> {
+        let found = drape(self.scene, x_bar, start, Start::Near, &mut |p| {
+            (run.observe)(&Progress::Drape(p))
+        });
+        run.factorisations += found.iterations;
+        let (status, residual) = (found.status, found.residual);
+        let failed = Failed { status, residual };
+        if status != RestStatus::AtRest {
+            return Err(failed);
+        }
+        let state = found.differentiable(self.scene).ok_or(failed)?;
+        Ok(End::Rest(Box::new(state)))
+    }
+
+    /// The drape as far as the paper's time steps bring it.
+    fn path(
+        &self,
+        x_bar: &[Vec2],
+        start: Vec<Vec3>,
+        run: &mut Run<'_, '_>,
+    ) -> Result<End<'s, S>, Failed> {
+        let steps = self.scene.params.step.steps();
+        let failed = |status, residual| Failed { status, residual };
+        let found = Trajectory::run(self.scene, x_bar, start, steps, &mut |p| {
+            (run.observe)(&Progress::Drape(p))
+        });
+        let found = found.ok_or(failed(RestStatus::Stopped, f64::NAN))?;
+        let residual = found.residual();
+        if !residual.is_finite() {
+            return Err(failed(RestStatus::NotFinite, residual));
+        }
+        Ok(End::Path(Box::new(found)))
+    }
+
+    /// The gradient of a candidate's loss by the unknowns \[1/m\], and how large the adjoint grew.
+    pub(in crate::refit) fn gradient(&self, of: &Candidate<'_, S>) -> (DVector<f64>, f64) {
+        let (mut hat, adjoint_norm) = of.end.pull_back(&of.loss.x_hat);
+        for (hat, direct) in hat.iter_mut().zip(&of.loss.x_bar_hat) {
+            *hat += direct;
+        }
+        let mut gradient = DVector::from_vec(self.cages.pull_back(&hat));
+        for prior in self.priors(&of.zeta) {
+            for (j, slope) in prior.by {
+                gradient[j] += 2.0 * prior.value * slope;
+            }
+        }
+        (gradient, adjoint_norm)
+    }
+
+    /// The candidate with its gradient.
+    pub(super) fn accept(&self, candidate: Candidate<'s, S>) -> Box<Point<'s>> {
+        let (gradient, adjoint_norm) = self.gradient(&candidate);
+        let end = candidate.end;
+        let (x, x_bar, residual) = (end.x().to_vec(), end.x_bar().to_vec(), end.residual());
+        let state = match end {
+            End::Rest(state) => Some(state),
+            End::Path(_) => None,
+        };
+        Box::new(Point {
+            zeta: candidate.zeta,
+            x,
+            x_bar,
+            loss: candidate.loss,
+            total: candidate.total,
+            gradient,
+            adjoint_norm,
+            residual,
+            shift: state.as_ref().map_or(0.0, |state| state.shift),
+            state,
+        })
+    }
+}

@@ -1,0 +1,123 @@
+use super::*;
+use crate::check::{assert_derivative, noise};
+use crate::garment::Fabric;
+use crate::pattern::PatternMesh;
+use crate::sim::Assembly;
+use crate::sim::cloth::{Hold, fixtures};
+use crate::sim::energy::contact::fixtures::Cone;
+use crate::sim::energy::contact::{ContactParams, Nothing};
+
+const SOFT: Fabric = Fabric {
+    warp: 50.0,
+    weft: 80.0,
+    poisson: 0.2,
+    shear: 20.0,
+    bending: 1e-4,
+    density: 0.2,
+};
+
+/// Derivative by the rest shape of a fixed linear function of the end, against two more trajectories.
+fn check<S: Surface>(cloth: &Cloth, surface: &S, mesh: &PatternMesh, x: &[Vec3], steps: usize) {
+    let params = SimParams {
+        contact: ContactParams {
+            thickness: 0.003,
+            stiffness: 1e5,
+        },
+        ..SimParams::default()
+    };
+    let scene = Scene {
+        cloth,
+        assembly: &Assembly::new(cloth),
+        surface,
+        params: &params,
+    };
+    let run = |x_bar: &[Vec2]| {
+        Trajectory::run(&scene, x_bar, x.to_vec(), steps, &mut |_| true).expect("not stopped")
+    };
+    let weights: Vec<Vec3> = (0..x.len())
+        .map(|i| Vec3::from_fn(|c, _| noise(11 * i + c)))
+        .collect();
+    let direction: Vec<Vec2> = (0..mesh.x_bar.len())
+        .map(|i| Vec2::new(noise(7 * i), noise(7 * i + 3)))
+        .collect();
+    let at = run(&mesh.x_bar);
+    let hat = at.pull_back(&weights);
+    let slope: f64 = hat
+        .x_bar
+        .iter()
+        .zip(&direction)
+        .map(|(h, d)| h.dot(d))
+        .sum();
+    let value = |s: f64| {
+        let each = mesh.x_bar.iter().zip(&direction);
+        let moved: Vec<Vec2> = each.map(|(p, d)| p + d * s).collect();
+        let x = run(&moved).last.x;
+        x.iter().zip(&weights).map(|(x, w)| x.dot(w)).sum::<f64>()
+    };
+    // A tenth of a micrometre: small enough that no contact switches, large enough for round-off.
+    assert_derivative(value, slope, 1e-7, 1e-3, 1e-6);
+}
+
+#[test]
+fn a_hanging_cloth_has_an_exact_adjoint() {
+    let mesh = fixtures::sheet(6, 6, 0.05);
+    let mut cloth = Cloth::new(&mesh, &SOFT);
+    // Held at its upper corners, in height alone: it swings about.
+    cloth.holds = [42, 48]
+        .map(|vertex| Hold {
+            vertex,
+            height: 0.3,
+            stiffness: 200.0,
+        })
+        .to_vec();
+    let x: Vec<Vec3> = mesh
+        .x_bar
+        .iter()
+        .enumerate()
+        .map(|(i, p)| Vec3::new(p.x, p.y, 0.01 * noise(i)))
+        .collect();
+    check(&cloth, &Nothing, &mesh, &x, 60);
+}
+
+#[test]
+fn a_tube_on_a_cone_has_an_exact_adjoint() {
+    let mesh = fixtures::tube(24, 6, 0.025);
+    let cloth = Cloth::new(&mesh, &SOFT);
+    let cone = Cone {
+        radius: 0.1,
+        slope: 0.3,
+        flat: 1.1,
+        lean: 0.2,
+    };
+    let mut x = fixtures::rolled(&mesh, 0.6, 0.11);
+    for (i, p) in x.iter_mut().enumerate() {
+        *p += Vec3::from_fn(|c, _| 1e-3 * noise(3 * i + c));
+    }
+    check(&cloth, &cone, &mesh, &x, 40);
+}
+
+#[test]
+fn steps_that_are_run_again_change_nothing() {
+    let mesh = fixtures::tube(12, 4, 0.06);
+    let cloth = Cloth::new(&mesh, &SOFT);
+    let params = SimParams::default();
+    let scene = Scene {
+        cloth: &cloth,
+        assembly: &Assembly::new(&cloth),
+        surface: &Nothing,
+        params: &params,
+    };
+    let x = fixtures::rolled(&mesh, 0.72, 0.1);
+    let run = |stride: usize| {
+        let mut all = Trajectory::run(&scene, &mesh.x_bar, x.clone(), 11, &mut |_| true)
+            .expect("not stopped");
+        all.kept = all.kept.into_iter().step_by(stride).collect();
+        all.stride = stride;
+        all.pull_back(&vec![Vec3::new(1.0, 2.0, 3.0); x.len()])
+    };
+    let (every, some) = (run(1), run(4));
+    assert_eq!(every.x_bar, some.x_bar);
+    assert_eq!(every.start.x, some.start.x);
+}
+
+mod implicit;
