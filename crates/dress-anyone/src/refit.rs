@@ -29,6 +29,7 @@ use crate::transfer::{TransferError, TransferParams};
 use dress::{HoldParams, drape_on};
 pub use measure::drape_report;
 use prepare::Prepared;
+use search::Search;
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
 
@@ -55,6 +56,9 @@ pub struct RefitParams {
     pub loss: LossParams,
     /// The search.
     pub descent: DescentParams,
+    /// Vertices of the mesh that is searched first, from which the garment's own mesh takes over;
+    /// 0 for none. The paper has none.
+    pub coarse: usize,
 }
 
 impl Default for RefitParams {
@@ -69,6 +73,7 @@ impl Default for RefitParams {
             cage: CageParams::default(),
             loss: LossParams::default(),
             descent: DescentParams::default(),
+            coarse: 800,
         }
     }
 }
@@ -168,31 +173,10 @@ pub fn refit(
 ) -> Result<Refit, RefitError> {
     let mut clock = Clock::new();
     let prepared = Prepared::new(garment, source, target, params, &mut clock, observe)?;
-    let (cages, losses) = (&prepared.cages, &prepared.losses);
-    let (source_drape, x_star) = (&prepared.source_drape, &prepared.x_star);
-
-    // §3, §4.4, §4.6: drape, compare, step, from the best of three guesses.
     let scene = prepared.scene();
-    let search = prepared.search(&scene);
-    let initial = prepared.initial();
-    let motions = &prepared.motions;
-    let drapes = [source_drape.as_slice(), x_star];
-    let flattened = flatten::flatten(
-        &garment.mesh,
-        cages,
-        motions,
-        losses,
-        drapes,
-        initial.clone(),
-    );
-    let mut guesses = vec![flattened];
-    if params.descent.gradient == Gradient::Equilibrium {
-        clock.stage("search in stiffer cloth", observe);
-        let third = stiffen::stiffened(&search, initial.clone(), guesses.clone(), &clock, observe)?;
-        guesses.extend(third);
-    }
-    clock.stage("search", observe);
-    let found = search.run(initial, guesses, &clock, observe)?;
+
+    // §3, §4.4, §4.6: drape, compare, step.
+    let found = searched(&prepared, &mut clock, observe)?;
 
     // The pattern as it will be cut: curves within the tolerance, and the drape of just that.
     clock.stage("pattern as written", observe);
@@ -210,17 +194,17 @@ pub fn refit(
         garment,
         source,
         target,
-        source_drape,
-        x_star,
+        source_drape: &prepared.source_drape,
+        x_star: &prepared.x_star,
         symmetry: prepared.symmetry.as_ref(),
         written: &written,
         last: &last,
-        losses,
+        losses: &prepared.losses,
     };
     let report = measured.report(
         found.status,
         prepared.scale,
-        cages.unknown_count(),
+        prepared.cages.unknown_count(),
         found.iterations,
         clock.stages,
     );
@@ -233,6 +217,82 @@ pub fn refit(
         initial: found.initial,
         report,
     })
+}
+
+/// The best pattern, searched for in a coarse mesh of the garment first if it is fine. What the
+/// coarse search ends with is a guess; the search in the garment's own mesh decides.
+fn searched(
+    prepared: &Prepared<'_>,
+    clock: &mut Clock,
+    observe: &mut Observer<'_>,
+) -> Result<Found, RefitError> {
+    if let Some(garment) = prepared.coarser() {
+        let stages = [
+            "search in stiffer cloth, coarse mesh",
+            "search, coarse mesh",
+        ];
+        match explored(&prepared.on_mesh_of(&garment)?, stages, clock, observe) {
+            Ok(coarse) => return finished(prepared, coarse, clock, observe),
+            // Not in so coarse a mesh.
+            Err(RefitError::NotAtRest { .. }) => {}
+            Err(error) => return Err(error),
+        }
+    }
+    explored(
+        prepared,
+        ["search in stiffer cloth", "search"],
+        clock,
+        observe,
+    )
+}
+
+/// The search in the garment's own mesh, from what the `coarse` one found. If that was interrupted,
+/// its pattern is draped and taken.
+fn finished(
+    prepared: &Prepared<'_>,
+    coarse: Found,
+    clock: &mut Clock,
+    observe: &mut Observer<'_>,
+) -> Result<Found, RefitError> {
+    clock.stage("search", observe);
+    let scene = prepared.scene();
+    let search = prepared.search(&scene);
+    let (initial, guesses) = (prepared.initial(), vec![coarse.zeta]);
+    if coarse.status != Status::Stopped {
+        return search.run(initial, guesses, clock, observe);
+    }
+    let no_further = DescentParams {
+        iterations: 0,
+        ..prepared.params.descent
+    };
+    let search = Search {
+        params: &no_further,
+        fresh_starts: 0,
+        ..search
+    };
+    let mut found = search.run(initial, guesses, clock, &mut |_| true)?;
+    found.status = Status::Stopped;
+    Ok(found)
+}
+
+/// The best pattern, from the best of three guesses.
+fn explored(
+    prepared: &Prepared<'_>,
+    [in_stiffer_cloth, in_its_own]: [&'static str; 2],
+    clock: &mut Clock,
+    observe: &mut Observer<'_>,
+) -> Result<Found, RefitError> {
+    let scene = prepared.scene();
+    let search = prepared.search(&scene);
+    let initial = prepared.initial();
+    let mut guesses = vec![flatten::flatten(prepared)];
+    if prepared.params.descent.gradient == Gradient::Equilibrium {
+        clock.stage(in_stiffer_cloth, observe);
+        let third = stiffen::stiffened(&search, initial.clone(), guesses.clone(), clock, observe)?;
+        guesses.extend(third);
+    }
+    clock.stage(in_its_own, observe);
+    search.run(initial, guesses, clock, observe)
 }
 
 /// The garment's drape on `body`, which must come to rest.
