@@ -4,6 +4,7 @@
 //! (§4.5) → initial scale, all these in `refit/prepare.rs` → drapes and steps (§3, §4.4) → the
 //! pattern as written.
 
+pub mod checkpoint;
 pub mod dress;
 mod flatten;
 pub mod gradient_check;
@@ -23,9 +24,11 @@ use crate::pattern::Pattern;
 use crate::problem::Problem;
 use crate::report::{Report, StageTime, Status};
 use crate::sim::drape::DrapeProgress;
+use crate::sim::energy::contact::Surface;
 use crate::sim::equilibrium::RestStatus;
 use crate::sim::{SimParams, Start, drape};
 use crate::transfer::{TransferError, TransferParams};
+use checkpoint::Checkpoint;
 use dress::{HoldParams, drape_on};
 pub use measure::drape_report;
 use prepare::Prepared;
@@ -80,6 +83,8 @@ pub enum Progress {
     Stage(&'static str),
     /// A drape proceeds.
     Drape(DrapeProgress),
+    /// The search may be taken up from here.
+    Checkpoint(Box<Checkpoint>),
     /// A step was accepted (or, for 0, the initial guess draped).
     Iteration {
         /// Accepted steps.
@@ -132,6 +137,12 @@ pub enum RefitError {
         /// ‖f‖/(‖m‖|g|).
         residual: f64,
     },
+    /// The checkpoint is of another refit.
+    #[error(
+        "the checkpoint is of another refit: garment, bodies and parameters must be those that it was \
+         made with"
+    )]
+    OtherCheckpoint,
     /// Stopped before there was anything to keep.
     #[error("interrupted before the first drape was done: there is nothing to keep yet")]
     Stopped,
@@ -166,7 +177,22 @@ pub fn refit(
     params: &RefitParams,
     observe: &mut Observer<'_>,
 ) -> Result<Refit, RefitError> {
+    refit_from(garment, source, target, params, None, observe)
+}
+
+/// A [`refit`] that goes on from a checkpoint, if there is one, as if it had not been interrupted.
+pub fn refit_from(
+    garment: &Garment,
+    source: &Body,
+    target: &Body,
+    params: &RefitParams,
+    checkpoint: Option<Checkpoint>,
+    observe: &mut Observer<'_>,
+) -> Result<Refit, RefitError> {
     let mut clock = Clock::new();
+    if let Some(checkpoint) = &checkpoint {
+        clock.before = checkpoint.elapsed;
+    }
     let prepared = Prepared::new(garment, source, target, params, &mut clock, observe)?;
     let (cages, losses) = (&prepared.cages, &prepared.losses);
     let (source_drape, x_star) = (&prepared.source_drape, &prepared.x_star);
@@ -174,25 +200,18 @@ pub fn refit(
     // §3, §4.4, §4.6: drape, compare, step, from the best of three guesses.
     let scene = prepared.scene();
     let search = prepared.search(&scene);
-    let initial = prepared.initial();
-    let motions = &prepared.motions;
-    let drapes = [source_drape.as_slice(), x_star];
-    let flattened = flatten::flatten(
-        &garment.mesh,
-        cages,
-        motions,
-        losses,
-        drapes,
-        initial.clone(),
-    );
-    let mut guesses = vec![flattened];
-    if params.descent.gradient == Gradient::Equilibrium {
-        clock.stage("search in stiffer cloth", observe);
-        let third = stiffen::stiffened(&search, initial.clone(), guesses.clone(), &clock, observe)?;
-        guesses.extend(third);
-    }
-    clock.stage("search", observe);
-    let found = search.run(initial, guesses, &clock, observe)?;
+    let found = match checkpoint {
+        Some(checkpoint) => {
+            clock.stage("search", observe);
+            if !checkpoint.is_of(params, x_star, cages.unknown_count()) {
+                return Err(RefitError::OtherCheckpoint);
+            }
+            search
+                .resume(checkpoint, &clock, observe)
+                .ok_or(RefitError::OtherCheckpoint)?
+        }
+        None => searched(&prepared, &search, &mut clock, observe)?,
+    };
 
     // The pattern as it will be cut: curves within the tolerance, and the drape of just that.
     clock.stage("pattern as written", observe);
@@ -235,6 +254,33 @@ pub fn refit(
     })
 }
 
+/// The best pattern from three guesses: the scaled reference, a pattern flattened from the target
+/// shape, and the end of a short search in stiffer cloth.
+fn searched<S: Surface>(
+    prepared: &Prepared<'_>,
+    search: &search::Search<'_, S>,
+    clock: &mut Clock,
+    observe: &mut Observer<'_>,
+) -> Result<Found, RefitError> {
+    let initial = prepared.initial();
+    let flattened = flatten::flatten(
+        &prepared.garment.mesh,
+        &prepared.cages,
+        &prepared.motions,
+        &prepared.losses,
+        [prepared.source_drape.as_slice(), &prepared.x_star],
+        initial.clone(),
+    );
+    let mut guesses = vec![flattened];
+    if search.params.gradient == Gradient::Equilibrium {
+        clock.stage("search in stiffer cloth", observe);
+        let third = stiffen::stiffened(search, initial.clone(), guesses.clone(), clock, observe)?;
+        guesses.extend(third);
+    }
+    clock.stage("search", observe);
+    search.run(initial, guesses, clock, observe)
+}
+
 /// The garment's drape on `body`, which must come to rest.
 fn drape_to_rest(
     garment: &Garment,
@@ -273,6 +319,8 @@ pub fn accept(found: &crate::sim::Drape, body: &Body) -> Result<(), RefitError> 
 /// Times the stages.
 pub(crate) struct Clock {
     start: Instant,
+    /// Seconds that an interrupted run had taken.
+    before: f64,
     current: Option<(&'static str, Instant)>,
     stages: Vec<StageTime>,
 }
@@ -281,6 +329,7 @@ impl Clock {
     fn new() -> Self {
         Self {
             start: Instant::now(),
+            before: 0.0,
             current: None,
             stages: Vec::new(),
         }
@@ -297,7 +346,7 @@ impl Clock {
 
     /// Since the start [s].
     fn elapsed(&self) -> f64 {
-        self.start.elapsed().as_secs_f64()
+        self.before + self.start.elapsed().as_secs_f64()
     }
 }
 
