@@ -4,8 +4,8 @@
 
 use super::*;
 use crate::geometry::Mat2;
-use crate::sim::step::StepParams;
 use crate::sim::adjoint;
+use crate::sim::step::StepParams;
 use nalgebra::{DMatrix, DVector};
 
 /// A cloth, what it hangs on, and how it is stepped.
