@@ -1,10 +1,30 @@
 //! What many tests begin with: plain panels, and the files of the shared data. Test-only.
 
 use crate::geometry::polygon::Polygon;
-use crate::geometry::{Mat3, Vec2, Vec3, bounds};
+use crate::geometry::{Mat3, TriangleMesh, Vec2, Vec3, bounds};
 use crate::io::garmentcode;
 use crate::pattern::{Curve, Edge, EdgeId, Panel, Pattern, PatternMesh, Placement, Stitch};
 use std::path::{Path, PathBuf};
+
+/// Adds a closed box to `mesh`, its faces outward \[m\].
+pub(crate) fn add_box(mesh: &mut TriangleMesh, low: [f64; 3], high: [f64; 3]) {
+    let base = mesh.positions.len() as u32;
+    for i in 0..8 {
+        let pick = |k: usize| if i >> k & 1 == 0 { low[k] } else { high[k] };
+        mesh.positions.push(Vec3::new(pick(0), pick(1), pick(2)));
+    }
+    let quads = [
+        [0, 4, 6, 2],
+        [1, 3, 7, 5],
+        [0, 1, 5, 4],
+        [2, 6, 7, 3],
+        [0, 2, 3, 1],
+        [4, 5, 7, 6],
+    ];
+    for [a, b, c, d] in quads.map(|q| q.map(|v| v + base)) {
+        mesh.triangles.extend([[a, b, c], [a, c, d]]);
+    }
+}
 
 /// Folders of the shared data that hold GarmentCode patterns.
 pub(crate) const GARMENTS: [&str; 4] = [

@@ -9,7 +9,7 @@ mod table;
 
 use crate::failure::Failure;
 use crate::picture::Figure;
-use arguments::{BodyCommand, FileArguments, LandmarkArguments, ModelArguments};
+use arguments::{BodyCommand, ModelArguments, SubjectArguments};
 use dress_anyone::body::Body;
 use dress_anyone::body_model::BodyModel;
 use dress_anyone::body_model::fit::{Fit, Landmarks};
@@ -27,9 +27,10 @@ pub fn run(command: &BodyCommand) -> Result<String, Failure> {
         BodyCommand::Show(arguments) => show::run(arguments),
         BodyCommand::Pose(arguments) => pose::run(arguments),
         BodyCommand::Measure(arguments) => {
-            crate::set_threads(&arguments.running)?;
-            let (model, body) = read(&arguments.model, &arguments.file)?;
-            let fit = fitted(&model, &body, &arguments.file, &arguments.landmarks)?;
+            let subject = &arguments.subject;
+            crate::set_threads(&subject.running)?;
+            let (model, body) = read(subject)?;
+            let fit = fitted(&model, &body, subject)?;
             Ok(measurements_text(&fit.measurements(&model)))
         }
         BodyCommand::Fit(arguments) => fit::run(arguments),
@@ -42,24 +43,20 @@ pub fn model(arguments: &ModelArguments) -> Result<BodyModel, BadInput> {
     file.map_or_else(|| Ok(body_model::built_in()), body_model::read)
 }
 
-fn read(arguments: &ModelArguments, file: &FileArguments) -> Result<(BodyModel, Body), Failure> {
-    let body = io::body::read(&file.file, &file.options())?;
-    Ok((model(arguments)?, body))
+/// The model and the body it is to be fitted to.
+fn read(subject: &SubjectArguments) -> Result<(BodyModel, Body), Failure> {
+    let body = io::body::read(&subject.file.file, &subject.file.options())?;
+    Ok((model(&subject.model)?, body))
 }
 
 /// The model fitted to the file's body.
-fn fitted(
-    model: &BodyModel,
-    body: &Body,
-    file: &FileArguments,
-    landmarks: &LandmarkArguments,
-) -> Result<Fit, Failure> {
-    let landmarks = match &landmarks.landmarks {
+fn fitted(model: &BodyModel, body: &Body, subject: &SubjectArguments) -> Result<Fit, Failure> {
+    let landmarks = match &subject.landmarks {
         Some(path) => read_landmarks(model, body, path)?,
         None => Landmarks::default(),
     };
     let fit = dress_anyone::body_model::fit::fit(model, &body.mesh, &landmarks);
-    Ok(fit.map_err(|problems| BadInput::new(&file.file, problems))?)
+    Ok(fit.map_err(|problems| BadInput::new(&subject.file.file, problems))?)
 }
 
 /// The landmarks in a TOML file, which has them in the unit and axes of the body's file.

@@ -19,6 +19,9 @@ pub struct HoldParams {
     /// Stiffness of the hold per length of the edge \[N/m²\]: 1e4 lets a waistband carrying 5 N/m
     /// sink by half a millimetre.
     pub stiffness: f64,
+    /// Cloth that reaches this far above an edge hangs from what is up there: the waist of a dress
+    /// needs no hold \[m\].
+    pub carried: f64,
 }
 
 impl Default for HoldParams {
@@ -26,13 +29,17 @@ impl Default for HoldParams {
         Self {
             labels: vec!["lower_interface".to_owned(), "strapless_top".to_owned()],
             stiffness: 1e4,
+            carried: 0.15,
         }
     }
 }
 
-/// Springs that keep the vertices of held edges at the heights they have in `x` \[m\].
+/// Springs that keep the vertices of held edges at the heights they have in `x` \[m\], where nothing
+/// above carries them.
 pub fn holds(garment: &Garment, x: &[Vec3], params: &HoldParams) -> Vec<Hold> {
     let mesh = &garment.mesh;
+    let top = x.iter().map(|p| p.y).fold(f64::NEG_INFINITY, f64::max);
+    let carried = |v: u32| top - x[mesh.sewing[v as usize] as usize].y > params.carried;
     let mut lengths: BTreeMap<u32, f64> = BTreeMap::new();
     for (p, panel) in garment.pattern.panels.iter().enumerate() {
         for (e, edge) in panel.edges.iter().enumerate() {
@@ -43,7 +50,11 @@ pub fn holds(garment: &Garment, x: &[Vec3], params: &HoldParams) -> Vec<Hold> {
             {
                 continue;
             }
-            for pair in mesh.edge_vertices[p][e].windows(2) {
+            let vertices = &mesh.edge_vertices[p][e];
+            if vertices.iter().all(|v| carried(*v)) {
+                continue;
+            }
+            for pair in vertices.windows(2) {
                 let [a, b] = [pair[0], pair[1]].map(|v| v as usize);
                 let half = 0.5 * (mesh.x_bar[b] - mesh.x_bar[a]).norm();
                 for v in [a, b] {
@@ -104,4 +115,31 @@ fn above_the_feet(mut x: Vec<Vec3>, body: &Body) -> Vec<Vec3> {
         }
     }
     x
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::loss::fixtures::two_panels;
+
+    #[test]
+    fn a_waist_is_held_unless_something_reaches_far_above_it() {
+        // Two panels, 0.4 m high; their lower side is edge 0, their upper side edge 2.
+        let held = |edge: usize| {
+            let (mut pattern, mesh) = two_panels();
+            pattern.panels[0].edges[edge].label = Some("lower_interface".to_owned());
+            let garment = Garment {
+                name: "tube".to_owned(),
+                pattern,
+                mesh,
+                drape: None,
+            };
+            let held = holds(&garment, &garment.placed(), &HoldParams::default()).len();
+            (held, garment.mesh.edge_vertices[0][edge].len())
+        };
+        let (waist, all) = held(2);
+        assert_eq!(waist, all);
+        let (below_a_bodice, _) = held(0);
+        assert_eq!(below_a_bodice, 0);
+    }
 }

@@ -51,55 +51,45 @@ pub struct ShowArguments {
 /// `dress body pose`.
 #[derive(Debug, Args)]
 pub struct PoseArguments {
-    /// The body.
+    /// The body and how to fit it.
     #[command(flatten)]
-    pub file: FileArguments,
+    pub subject: SubjectArguments,
     /// `a`, `t`, or a TOML file with a table `rotations`: joint = [x, y, z], axis times degrees
     #[arg(long, value_name = "POSE", default_value = "a")]
     pub pose: String,
     /// Folder for the results
     #[arg(long, value_name = "FOLDER", default_value = "dress-out")]
     pub out: PathBuf,
-    /// Landmarks.
-    #[command(flatten)]
-    pub landmarks: LandmarkArguments,
-    /// The model.
-    #[command(flatten)]
-    pub model: ModelArguments,
-    /// How to run.
-    #[command(flatten)]
-    pub running: RunningArguments,
 }
 
 /// `dress body measure`.
 #[derive(Debug, Args)]
 pub struct MeasureArguments {
-    /// The body.
+    /// The body and how to fit it.
     #[command(flatten)]
-    pub file: FileArguments,
-    /// Landmarks.
-    #[command(flatten)]
-    pub landmarks: LandmarkArguments,
-    /// The model.
-    #[command(flatten)]
-    pub model: ModelArguments,
-    /// How to run.
-    #[command(flatten)]
-    pub running: RunningArguments,
+    pub subject: SubjectArguments,
 }
 
 /// `dress body fit`.
 #[derive(Debug, Args)]
 pub struct FitArguments {
-    /// The body.
+    /// The body and how to fit it.
     #[command(flatten)]
-    pub file: FileArguments,
+    pub subject: SubjectArguments,
     /// Folder for the results
     #[arg(long, value_name = "FOLDER", default_value = "dress-out")]
     pub out: PathBuf,
-    /// Landmarks.
+}
+
+/// A body that the model is fitted to.
+#[derive(Debug, Args)]
+pub struct SubjectArguments {
+    /// The body.
     #[command(flatten)]
-    pub landmarks: LandmarkArguments,
+    pub file: FileArguments,
+    /// TOML file with a table `landmarks`: joint or point = [x, y, z] in the body file's unit and axes
+    #[arg(long, value_name = "FILE")]
+    pub landmarks: Option<PathBuf>,
     /// The model.
     #[command(flatten)]
     pub model: ModelArguments,
@@ -114,14 +104,6 @@ pub struct ModelArguments {
     /// Body model in SMPL's layout (plain .npz) [default: built in]
     #[arg(long, value_name = "FILE")]
     pub model: Option<PathBuf>,
-}
-
-/// What is known of the body.
-#[derive(Debug, Args)]
-pub struct LandmarkArguments {
-    /// TOML file with a table `landmarks`: joint or point = [x, y, z] in the body file's unit and axes
-    #[arg(long, value_name = "FILE")]
-    pub landmarks: Option<PathBuf>,
 }
 
 /// A body file and how to read it.

@@ -30,16 +30,17 @@ struct Report<'a> {
 
 /// Fits and writes; what to say about it in the end.
 pub fn run(arguments: &FitArguments) -> Result<String, Failure> {
-    crate::set_threads(&arguments.running)?;
-    let (model, body) = read(&arguments.model, &arguments.file)?;
+    let subject = &arguments.subject;
+    crate::set_threads(&subject.running)?;
+    let (model, body) = read(subject)?;
     check_writable(&arguments.out)?;
-    let mut progress = Progress::new(arguments.running.quiet);
+    let mut progress = Progress::new(subject.running.quiet);
     progress.notes(&body.name, &body.notes);
-    let fit = fitted(&model, &body, &arguments.file, &arguments.landmarks)?;
+    let fit = fitted(&model, &body, subject)?;
     progress.notes(&body.name, &fit.report.notes);
     let measurements = fit.measurements(&model);
     let report = Report {
-        body: InputReport::of_body(Input::File(&arguments.file.file), &body),
+        body: InputReport::of_body(Input::File(&subject.file.file), &body),
         model: &model.parts().name,
         fit: &fit.report,
         measurements: &measurements,
@@ -60,7 +61,7 @@ pub fn run(arguments: &FitArguments) -> Result<String, Failure> {
     output.add("fit.json", json(&report)?);
     output.add("fit.png", picture(&model, &body, &fit, &posed));
     output.write()?;
-    if arguments.running.quiet {
+    if subject.running.quiet {
         return Ok(String::new());
     }
     Ok(summary(&body.name, &fit) + &measurements_text(&measurements))

@@ -16,15 +16,16 @@ use std::path::Path;
 
 /// Fits, poses and writes; what to say about it in the end.
 pub fn run(arguments: &PoseArguments) -> Result<String, Failure> {
-    crate::set_threads(&arguments.running)?;
-    let (model, body) = read(&arguments.model, &arguments.file)?;
+    let subject = &arguments.subject;
+    crate::set_threads(&subject.running)?;
+    let (model, body) = read(subject)?;
     check_writable(&arguments.out)?;
     let mut pose = match arguments.pose.as_str() {
         "a" => model.arms_at(FRAC_PI_4),
         "t" => model.arms_at(0.0),
         file => from_file(&model, Path::new(file))?,
     };
-    let fit = fitted(&model, &body, &arguments.file, &arguments.landmarks)?;
+    let fit = fitted(&model, &body, subject)?;
     let (low, high) = bounds(&fit.posed(&model, &pose).positions);
     pose.translation = Vec3::new(-0.5 * (low.x + high.x), -low.y, -0.5 * (low.z + high.z));
     let posed = fit.posed(&model, &pose);

@@ -40,19 +40,18 @@ const MENDINGS: usize = 6;
 /// Moves `body` onto `scan`.
 pub(super) fn conform(body: &TriangleMesh, parts: &[Part], scan: &Scan) -> Moved {
     let elastic = Elastic::new(body);
+    let all_pairs = |now: &TriangleMesh, sigma| {
+        let search = Search {
+            sigma,
+            cosine: COSINE,
+            points: usize::MAX,
+        };
+        pairs(now, parts, scan, search)
+    };
     let mut now = body.clone();
     for (stiffness, sigma) in ROUNDS {
         for _ in 0..STEPS {
-            let rows = pairs(
-                &now,
-                parts,
-                scan,
-                Search {
-                    sigma,
-                    cosine: COSINE,
-                    points: usize::MAX,
-                },
-            );
+            let rows = all_pairs(&now, sigma);
             elastic.step(&mut now.positions, &rows, stiffness);
         }
     }
@@ -64,16 +63,7 @@ pub(super) fn conform(body: &TriangleMesh, parts: &[Part], scan: &Scan) -> Moved
             break;
         }
         loose.extend(elastic.around(&flipped));
-        let mut rows = pairs(
-            &now,
-            parts,
-            scan,
-            Search {
-                sigma,
-                cosine: COSINE,
-                points: usize::MAX,
-            },
-        );
+        let mut rows = all_pairs(&now, sigma);
         rows.retain(|row| !row.corners.iter().any(|v| loose.contains(v)));
         elastic.step(&mut now.positions, &rows, stiffness);
         flipped = elastic.flipped(&now.positions);

@@ -2,6 +2,7 @@ use super::*;
 use crate::body_model::measure::measure;
 use crate::body_model::sample::Random;
 use crate::check::noise;
+use crate::fixture::add_box;
 use crate::geometry::{ClosestPoint, Mat3, bounds};
 use crate::io::body_model::built_in;
 
@@ -143,25 +144,7 @@ fn a_chair_is_no_body() {
         ([0.0, 0.0, 0.41], [0.04, 0.47, 0.04]),
         ([0.41, 0.0, 0.41], [0.04, 0.47, 0.04]),
     ] {
-        let first = chair.positions.len() as u32;
-        chair.positions.extend(
-            (0..8).map(|i| {
-                Vec3::from_fn(|c, _| low[c] + if i >> c & 1 == 1 { size[c] } else { 0.0 })
-            }),
-        );
-        let quads = [
-            [0, 4, 6, 2],
-            [1, 3, 7, 5],
-            [0, 1, 5, 4],
-            [2, 6, 7, 3],
-            [0, 2, 3, 1],
-            [4, 5, 7, 6],
-        ];
-        for [a, b, c, d] in quads {
-            chair
-                .triangles
-                .extend([[a, b, c], [a, c, d]].map(|t| t.map(|v| v + first)));
-        }
+        add_box(&mut chair, low, [0, 1, 2].map(|c| low[c] + size[c]));
     }
     let told = fit(&built_in(), &chair, &Landmarks::default()).unwrap_err();
     assert!(told[0].text.contains("no body was recognised"), "{told:?}");

@@ -1,27 +1,10 @@
 use super::*;
-use crate::fixture::shared;
+use crate::fixture::{add_box, shared};
 
 /// A crude person in a T-pose, 1.7 m tall and 1.6 m from hand to hand: closed boxes.
 fn person() -> TriangleMesh {
     let mut mesh = TriangleMesh::default();
-    let mut cuboid = |low: [f64; 3], high: [f64; 3]| {
-        let base = mesh.positions.len() as u32;
-        for i in 0..8 {
-            let pick = |k: usize| if i >> k & 1 == 0 { low[k] } else { high[k] };
-            mesh.positions.push(Vec3::new(pick(0), pick(1), pick(2)));
-        }
-        let quads = [
-            [0, 4, 6, 2],
-            [1, 3, 7, 5],
-            [0, 1, 5, 4],
-            [2, 6, 7, 3],
-            [0, 2, 3, 1],
-            [4, 5, 7, 6],
-        ];
-        for [a, b, c, d] in quads.map(|q| q.map(|v| v + base)) {
-            mesh.triangles.extend([[a, b, c], [a, c, d]]);
-        }
-    };
+    let mut cuboid = |low, high| add_box(&mut mesh, low, high);
     cuboid([-0.2, 0.8, -0.1], [0.2, 1.45, 0.12]);
     cuboid([-0.1, 1.45, -0.1], [0.1, 1.7, 0.1]);
     for side in [-1.0, 1.0] {

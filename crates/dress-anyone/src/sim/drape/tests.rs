@@ -15,6 +15,28 @@ const SOFT: Fabric = Fabric {
     density: 0.2,
 };
 
+/// A tube of circumference 0.6 m meets 0.6 m and more on it: held by the slope alone.
+const TIGHT: Cone = Cone {
+    radius: 0.1,
+    slope: 0.3,
+    flat: 1.1,
+    lean: 0.2,
+};
+
+fn scene<'a, S>(
+    cloth: &'a Cloth,
+    assembly: &'a Assembly,
+    surface: &'a S,
+    params: &'a SimParams,
+) -> Scene<'a, S> {
+    Scene {
+        cloth,
+        assembly,
+        surface,
+        params,
+    }
+}
+
 fn settle<S: Surface>(scene: &Scene<'_, S>, x_bar: &[Vec2], x: Vec<Vec3>) -> Drape {
     let drape = drape(scene, x_bar, x, Start::Near, &mut |_| true);
     assert_eq!(
@@ -115,12 +137,7 @@ fn the_gradient_of_a_skirt_agrees_with_two_drapes() {
         lean: 0.1,
     };
     let params = firm_contact();
-    let scene = Scene {
-        cloth: &cloth,
-        assembly: &assembly,
-        surface: &cone,
-        params: &params,
-    };
+    let scene = scene(&cloth, &assembly, &cone, &params);
     let mut x = fixtures::rolled(&mesh, 0.96, 0.16);
     for (i, p) in x.iter_mut().enumerate() {
         *p += Vec3::from_fn(|c, _| 1e-3 * noise(3 * i + c)) - Vec3::y() * 0.4;
@@ -135,20 +152,8 @@ fn the_gradient_of_a_tight_tube_agrees_with_two_drapes() {
     skew(&mut mesh);
     let cloth = Cloth::new(&mesh, &SOFT);
     let assembly = Assembly::new(&cloth);
-    // Circumference 0.6 m on a cone of 0.6 m and more: held by the slope alone.
-    let cone = Cone {
-        radius: 0.1,
-        slope: 0.3,
-        flat: 1.1,
-        lean: 0.2,
-    };
     let params = firm_contact();
-    let scene = Scene {
-        cloth: &cloth,
-        assembly: &assembly,
-        surface: &cone,
-        params: &params,
-    };
+    let scene = scene(&cloth, &assembly, &TIGHT, &params);
     let x = fixtures::rolled(&mesh, 0.6, 0.11);
     check_gradient(&scene, &mesh.x_bar, x, 1e-7);
 }
@@ -175,12 +180,6 @@ fn the_gradient_of_one_tube_over_another_agrees_with_two_drapes() {
     let mesh = nested(&inner);
     let cloth = Cloth::new(&mesh, &SOFT);
     let assembly = Assembly::new(&cloth);
-    let cone = Cone {
-        radius: 0.1,
-        slope: 0.3,
-        flat: 1.1,
-        lean: 0.2,
-    };
     let params = SimParams {
         layers: LayerParams {
             on: true,
@@ -189,12 +188,7 @@ fn the_gradient_of_one_tube_over_another_agrees_with_two_drapes() {
         },
         ..firm_contact()
     };
-    let scene = Scene {
-        cloth: &cloth,
-        assembly: &assembly,
-        surface: &cone,
-        params: &params,
-    };
+    let scene = scene(&cloth, &assembly, &TIGHT, &params);
     let mut x = fixtures::rolled(&inner, 0.6, 0.11);
     // The outer one turned by a fraction of a column, so that vertices do not lie on vertices.
     let (sine, cosine) = 0.07_f64.sin_cos();
@@ -251,12 +245,7 @@ fn a_tight_tube_presses_as_laplace_says() {
         },
         ..SimParams::default()
     };
-    let scene = Scene {
-        cloth: &cloth,
-        assembly: &assembly,
-        surface: &cylinder,
-        params: &params,
-    };
+    let scene = scene(&cloth, &assembly, &cylinder, &params);
     let x = fixtures::rolled(&mesh, 0.6, 0.1001);
     let rest = cloth.at_rest(&mesh.x_bar);
     let drape = drape(&scene, &mesh.x_bar, x, Start::Near, &mut |_| true);
@@ -285,12 +274,7 @@ fn a_sheet_on_the_floor_sinks_in_by_its_weight() {
     let assembly = Assembly::new(&cloth);
     let floor = Floor { height: 0.0 };
     let params = SimParams::default();
-    let scene = Scene {
-        cloth: &cloth,
-        assembly: &assembly,
-        surface: &floor,
-        params: &params,
-    };
+    let scene = scene(&cloth, &assembly, &floor, &params);
     let x = mesh
         .x_bar
         .iter()
@@ -309,12 +293,7 @@ fn what_nothing_holds_falls_and_is_reported() {
     let cloth = Cloth::new(&mesh, &SOFT);
     let assembly = Assembly::new(&cloth);
     let params = SimParams::default();
-    let scene = Scene {
-        cloth: &cloth,
-        assembly: &assembly,
-        surface: &Nothing,
-        params: &params,
-    };
+    let scene = scene(&cloth, &assembly, &Nothing, &params);
     let x = mesh
         .x_bar
         .iter()
