@@ -140,7 +140,7 @@ impl Model {
 }
 
 /// The damping μ, as steps succeed and fail.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Damping(pub f64);
 
 impl Damping {

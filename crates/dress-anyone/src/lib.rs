@@ -17,7 +17,7 @@
 //! | [`cage`] | §4.3, §4.5 | control points ζ ↦ rest shape x̄, symmetric |
 //! | [`sim`] | §3 | the drape and its adjoint |
 //! | [`loss`] | §4.4 | what the refit minimises |
-//! | [`descent`] | §4.6 | Levenberg–Marquardt |
+//! | [`descent`] | §4.6 | Levenberg–Marquardt, L-BFGS, gradient descent |
 //! | `refit` | §4 | all of it, in order |
 //! | [`io`] | – | files; the only place that knows their units |
 //!

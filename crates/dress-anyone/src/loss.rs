@@ -79,7 +79,7 @@ impl Default for LossParams {
 }
 
 /// The value of each term, unweighted, in the order of [`LossParams`].
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct LossTerms {
     /// Mean squared distance of the boundary to x* \[cm²\].
     pub boundary: f64,

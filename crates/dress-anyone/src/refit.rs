@@ -4,9 +4,11 @@
 //! (§4.5) → initial scale, all these in `refit/prepare.rs` → drapes and steps (§3, §4.4) → the
 //! pattern as written.
 
+pub mod checkpoint;
 pub mod dress;
 mod flatten;
 pub mod gradient_check;
+mod levels;
 mod measure;
 mod prepare;
 mod search;
@@ -15,7 +17,7 @@ mod written;
 
 use crate::body::Body;
 use crate::cage::CageParams;
-use crate::descent::{DescentParams, Gradient};
+use crate::descent::DescentParams;
 use crate::garment::{Fabric, Garment};
 use crate::geometry::{Vec2, Vec3};
 use crate::loss::{LossParams, LossTerms};
@@ -26,10 +28,10 @@ use crate::sim::drape::DrapeProgress;
 use crate::sim::equilibrium::RestStatus;
 use crate::sim::{SimParams, Start, drape};
 use crate::transfer::{TransferError, TransferParams};
+use checkpoint::Checkpoint;
 use dress::{HoldParams, drape_on};
 pub use measure::drape_report;
 use prepare::Prepared;
-use search::Search;
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
 
@@ -85,6 +87,8 @@ pub enum Progress {
     Stage(&'static str),
     /// A drape proceeds.
     Drape(DrapeProgress),
+    /// The search may be taken up from here.
+    Checkpoint(Box<Checkpoint>),
     /// A step was accepted (or, for 0, the initial guess draped).
     Iteration {
         /// Accepted steps.
@@ -137,6 +141,12 @@ pub enum RefitError {
         /// ‖f‖/(‖m‖|g|).
         residual: f64,
     },
+    /// The checkpoint is of another refit.
+    #[error(
+        "the checkpoint is of another refit: garment, bodies and parameters must be those that it was \
+         made with"
+    )]
+    OtherCheckpoint,
     /// Stopped before there was anything to keep.
     #[error("interrupted before the first drape was done: there is nothing to keep yet")]
     Stopped,
@@ -171,12 +181,38 @@ pub fn refit(
     params: &RefitParams,
     observe: &mut Observer<'_>,
 ) -> Result<Refit, RefitError> {
+    refit_from(garment, source, target, params, None, observe)
+}
+
+/// A [`refit`] that goes on from a checkpoint, if there is one, as if it had not been interrupted.
+pub fn refit_from(
+    garment: &Garment,
+    source: &Body,
+    target: &Body,
+    params: &RefitParams,
+    checkpoint: Option<Checkpoint>,
+    observe: &mut Observer<'_>,
+) -> Result<Refit, RefitError> {
     let mut clock = Clock::new();
+    if let Some(checkpoint) = &checkpoint {
+        clock.before = checkpoint.elapsed;
+    }
     let prepared = Prepared::new(garment, source, target, params, &mut clock, observe)?;
     let scene = prepared.scene();
 
     // §3, §4.4, §4.6: drape, compare, step.
-    let found = searched(&prepared, &mut clock, observe)?;
+    let found = match checkpoint {
+        Some(checkpoint) => {
+            clock.stage("search", observe);
+            let unknowns = prepared.cages.unknown_count();
+            if !checkpoint.is_of(params, &prepared.x_star, unknowns) {
+                return Err(RefitError::OtherCheckpoint);
+            }
+            let found = prepared.search(&scene).resume(checkpoint, &clock, observe);
+            found.ok_or(RefitError::OtherCheckpoint)?
+        }
+        None => levels::searched(&prepared, &mut clock, observe)?,
+    };
 
     // The pattern as it will be cut: curves within the tolerance, and the drape of just that.
     clock.stage("pattern as written", observe);
@@ -219,82 +255,6 @@ pub fn refit(
     })
 }
 
-/// The best pattern, searched for in a coarse mesh of the garment first if it is fine. What the
-/// coarse search ends with is a guess; the search in the garment's own mesh decides.
-fn searched(
-    prepared: &Prepared<'_>,
-    clock: &mut Clock,
-    observe: &mut Observer<'_>,
-) -> Result<Found, RefitError> {
-    if let Some(garment) = prepared.coarser() {
-        let stages = [
-            "search in stiffer cloth, coarse mesh",
-            "search, coarse mesh",
-        ];
-        match explored(&prepared.on_mesh_of(&garment)?, stages, clock, observe) {
-            Ok(coarse) => return finished(prepared, coarse, clock, observe),
-            // Not in so coarse a mesh.
-            Err(RefitError::NotAtRest { .. }) => {}
-            Err(error) => return Err(error),
-        }
-    }
-    explored(
-        prepared,
-        ["search in stiffer cloth", "search"],
-        clock,
-        observe,
-    )
-}
-
-/// The search in the garment's own mesh, from what the `coarse` one found. If that was interrupted,
-/// its pattern is draped and taken.
-fn finished(
-    prepared: &Prepared<'_>,
-    coarse: Found,
-    clock: &mut Clock,
-    observe: &mut Observer<'_>,
-) -> Result<Found, RefitError> {
-    clock.stage("search", observe);
-    let scene = prepared.scene();
-    let search = prepared.search(&scene);
-    let (initial, guesses) = (prepared.initial(), vec![coarse.zeta]);
-    if coarse.status != Status::Stopped {
-        return search.run(initial, guesses, clock, observe);
-    }
-    let no_further = DescentParams {
-        iterations: 0,
-        ..prepared.params.descent
-    };
-    let search = Search {
-        params: &no_further,
-        fresh_starts: 0,
-        ..search
-    };
-    let mut found = search.run(initial, guesses, clock, &mut |_| true)?;
-    found.status = Status::Stopped;
-    Ok(found)
-}
-
-/// The best pattern, from the best of three guesses.
-fn explored(
-    prepared: &Prepared<'_>,
-    [in_stiffer_cloth, in_its_own]: [&'static str; 2],
-    clock: &mut Clock,
-    observe: &mut Observer<'_>,
-) -> Result<Found, RefitError> {
-    let scene = prepared.scene();
-    let search = prepared.search(&scene);
-    let initial = prepared.initial();
-    let mut guesses = vec![flatten::flatten(prepared)];
-    if prepared.params.descent.gradient == Gradient::Equilibrium {
-        clock.stage(in_stiffer_cloth, observe);
-        let third = stiffen::stiffened(&search, initial.clone(), guesses.clone(), clock, observe)?;
-        guesses.extend(third);
-    }
-    clock.stage(in_its_own, observe);
-    search.run(initial, guesses, clock, observe)
-}
-
 /// The garment's drape on `body`, which must come to rest.
 fn drape_to_rest(
     garment: &Garment,
@@ -333,6 +293,8 @@ pub fn accept(found: &crate::sim::Drape, body: &Body) -> Result<(), RefitError> 
 /// Times the stages.
 pub(crate) struct Clock {
     start: Instant,
+    /// Seconds that an interrupted run had taken.
+    before: f64,
     current: Option<(&'static str, Instant)>,
     stages: Vec<StageTime>,
 }
@@ -341,6 +303,7 @@ impl Clock {
     fn new() -> Self {
         Self {
             start: Instant::now(),
+            before: 0.0,
             current: None,
             stages: Vec::new(),
         }
@@ -357,7 +320,7 @@ impl Clock {
 
     /// Since the start [s].
     fn elapsed(&self) -> f64 {
-        self.start.elapsed().as_secs_f64()
+        self.before + self.start.elapsed().as_secs_f64()
     }
 }
 

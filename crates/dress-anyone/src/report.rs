@@ -3,7 +3,7 @@
 use crate::geometry::quality::QualitySummary;
 use crate::loss::LossTerms;
 use crate::sim::equilibrium::RestStatus;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// How a refit ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -20,7 +20,7 @@ pub enum Status {
 }
 
 /// One accepted step, or the start.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Iteration {
     /// 0 is the initial guess.
     pub iteration: usize,

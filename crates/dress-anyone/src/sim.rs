@@ -3,7 +3,8 @@
 //! [`cloth`] is the topology, [`energy`] the pieces of the total energy U(x; x̄), each with its
 //! derivatives beside it. [`step`] is the paper's XPBD integrator, which brings placed panels
 //! together; [`equilibrium`] then finds f = −∂U/∂x = 0 by Newton's method, and [`adjoint`]
-//! differentiates that state. [`mod@drape`] does the three in order.
+//! differentiates that state. [`mod@drape`] does the three in order. [`trajectory`] drapes and
+//! differentiates as the paper does: by time steps alone, and all of them.
 
 pub mod adjoint;
 pub mod cloth;

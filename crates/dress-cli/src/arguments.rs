@@ -55,6 +55,12 @@ pub struct RefitArguments {
     /// Pose of the result: the source body's, or the target body's own besides
     #[arg(long, value_name = "POSE", default_value = "source")]
     pub pose: PoseChoice,
+    /// Folder in which to note every step of the search, so that it can be resumed
+    #[arg(long, value_name = "FOLDER")]
+    pub checkpoint: Option<PathBuf>,
+    /// Go on from what an interrupted refit of the same noted in this folder, and note further steps there
+    #[arg(long, value_name = "FOLDER", conflicts_with = "checkpoint")]
+    pub resume: Option<PathBuf>,
 }
 
 /// `dress check-gradient`.

@@ -47,7 +47,7 @@ fn table(garment: &str, checked: &GradientCheck) -> String {
                 text,
                 "{:>9}  {:>13}  {:>11.5}  {:>11}  {:>11}",
                 number + 1,
-                1e3 * step,
+                millimetres(*step),
                 direction.predicted,
                 or_none(slope.map(|slope| format!("{slope:.5}"))),
                 or_none(difference.map(|difference| format!("{difference:.1e}"))),
@@ -57,9 +57,14 @@ fn table(garment: &str, checked: &GradientCheck) -> String {
     let trust = match checked.trust {
         Some(step) => format!(
             "All agree to {TRUSTED} for moves of the pattern up to {} mm.",
-            1e3 * step
+            millimetres(step)
         ),
         None => format!("At no step do all agree to {TRUSTED}."),
     };
     text + "\n" + &trust + "\n"
+}
+
+/// To the nanometre, so that what is short in metres is short in millimetres.
+fn millimetres(metres: f64) -> f64 {
+    (metres * 1e9).round() / 1e6
 }

@@ -11,6 +11,7 @@
 mod arguments;
 mod body;
 mod check_gradient;
+mod checkpoint;
 mod correspond;
 mod drape;
 mod failure;

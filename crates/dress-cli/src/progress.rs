@@ -67,6 +67,7 @@ impl<W: Write> Progress<W> {
             refit::Progress::Iteration {
                 iteration, loss, ..
             } => self.iteration(*iteration, *loss),
+            refit::Progress::Checkpoint(_) => {}
         }
     }
 

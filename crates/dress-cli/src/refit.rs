@@ -1,6 +1,7 @@
 //! `dress refit`.
 
 use crate::arguments::{PoseChoice, RefitArguments};
+use crate::checkpoint;
 use crate::correspond::How;
 use crate::failure::Failure;
 use crate::fitting::Inputs;
@@ -17,7 +18,7 @@ use dress_anyone::geometry::{TriangleMesh, Vec3};
 use dress_anyone::io::output::Output;
 use dress_anyone::io::{body, garment_obj, garmentcode, obj, svg};
 use dress_anyone::refit::dress::drape_on;
-use dress_anyone::refit::{Refit, RefitError, accept, refit};
+use dress_anyone::refit::{self, Refit, RefitError, accept, refit_from};
 use dress_anyone::report::Report;
 use dress_anyone::transfer::target_shape;
 use serde::Serialize;
@@ -29,13 +30,21 @@ pub fn run(arguments: &RefitArguments) -> Result<String, Failure> {
     let mut progress = Progress::new(quiet);
     let inputs = Inputs::read(&arguments.fitting, Some(&arguments.out), &mut progress)?;
     let stop = stop_on_ctrl_c().context("Ctrl-C cannot be listened to")?;
-    let refitted = refit(
+    let folder = arguments.resume.as_ref().or(arguments.checkpoint.as_ref());
+    let from = arguments.resume.as_deref().map(checkpoint::read);
+    let refitted = refit_from(
         &inputs.loaded.garment,
         &inputs.source,
         &inputs.target,
         &inputs.params.refit,
+        from.transpose()?,
         &mut |event| {
             progress.event(event);
+            if let (refit::Progress::Checkpoint(state), Some(folder)) = (event, folder)
+                && let Err(failure) = checkpoint::write(folder, state)
+            {
+                progress.notes("checkpoint", &[failure.to_string()]);
+            }
             !stop.load(Ordering::SeqCst)
         },
     );

@@ -6,13 +6,15 @@
 //! long a step may be is for the caller to try; [`Slope::length`] is where to begin.
 
 use nalgebra::DVector;
+use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
 
 /// Pairs that L-BFGS keeps; more hardly help where the loss is not smooth.
 const KEPT: usize = 10;
 
 /// Where to go next, as a search by gradients learns it.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Slope {
     /// Largest number of pairs kept: none for plain descent.
     most: usize,
@@ -74,6 +76,12 @@ impl Slope {
             self.pairs.pop_front();
         }
         self.pairs.push_back((s, y));
+    }
+
+    /// Whether what it learned has so many unknowns.
+    pub fn is_of(&self, unknowns: usize) -> bool {
+        let right = |v: &DVector<f64>| v.len() == unknowns;
+        self.pairs.iter().all(|(s, y)| right(s) && right(y))
     }
 
     /// No step along the direction helped: begins anew with the gradient. Whether that is something

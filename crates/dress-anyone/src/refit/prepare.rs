@@ -180,6 +180,7 @@ impl<'a> Prepared<'a> {
                 Gradient::Equilibrium => search::FRESH_STARTS,
                 Gradient::Trajectory => 0,
             },
+            keep: Some(self.params),
         }
     }
 

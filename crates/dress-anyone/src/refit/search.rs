@@ -9,7 +9,8 @@ pub(super) mod guards;
 pub(super) mod newton;
 pub(super) mod point;
 
-use super::{Clock, Found, Observer, Progress, RefitError};
+use super::checkpoint::Checkpoint;
+use super::{Clock, Found, Observer, Progress, RefitError, RefitParams};
 use crate::cage::{Cages, Prior};
 use crate::descent::slope::Slope;
 use crate::descent::{Damping, DescentParams, Optimizer};
@@ -23,6 +24,7 @@ use crate::sim::equilibrium::RestStatus;
 use guards::{farthest, quality_floor};
 use nalgebra::DVector;
 use point::Point;
+use serde::{Deserialize, Serialize};
 
 /// Predicted moves of the cloth beyond this are not trusted as a start \[m\].
 const FARTHEST_PREDICTION: f64 = 0.03;
@@ -47,6 +49,21 @@ pub(super) struct Search<'a, S> {
     pub(super) params: &'a DescentParams,
     /// How often a settled pattern is draped again from the target shape.
     pub(super) fresh_starts: usize,
+    /// Parameters to note in checkpoints; none to make none.
+    pub(super) keep: Option<&'a RefitParams>,
+}
+
+/// What changes from step to step.
+struct Going<'s> {
+    best: Box<Point<'s>>,
+    /// The drape of the initial guess.
+    initial: Vec<Vec3>,
+    steps: Steps,
+    /// Steps in a row that hardly lowered the loss.
+    slow: usize,
+    fresh_starts: usize,
+    /// Farthest move of the last step \[m\]; none where it says nothing.
+    moved: Option<f64>,
 }
 
 /// What changes while searching.
@@ -60,7 +77,8 @@ pub(super) struct Run<'a, 'b> {
 }
 
 /// What makes the steps, and what it has learned.
-enum Steps {
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub(super) enum Steps {
     Newton(Damping),
     Downhill(Slope),
 }
@@ -71,6 +89,14 @@ impl Steps {
             Optimizer::Lm => Self::Newton(Damping(params.damping)),
             Optimizer::Lbfgs => Self::Downhill(Slope::lbfgs(params.step)),
             Optimizer::Descent => Self::Downhill(Slope::steepest(params.step)),
+        }
+    }
+
+    /// Whether what it learned has so many unknowns.
+    pub(super) fn is_of(&self, unknowns: usize) -> bool {
+        match self {
+            Self::Newton(_) => true,
+            Self::Downhill(slope) => slope.is_of(unknowns),
         }
     }
 }
@@ -103,7 +129,7 @@ impl<'s, S: Surface> Search<'s, S> {
         let mut best = self.first(initial, &mut run)?;
         let initial = best.x.clone();
         self.note(&best, 0.0, &mut run);
-        let mut moved = f64::INFINITY;
+        let mut moved = None;
         for guess in others {
             if !run.go_on {
                 break;
@@ -111,23 +137,90 @@ impl<'s, S: Surface> Search<'s, S> {
             let tried = self.candidate(guess, self.x_star.to_vec(), &mut run);
             if let Some(better) = tried.ok().filter(|tried| tried.total < best.total) {
                 let better = self.accept(better);
-                moved = farthest(&better.x_bar, &best.x_bar);
+                let far = farthest(&better.x_bar, &best.x_bar);
+                moved = Some(far);
                 best = better;
-                self.note(&best, moved, &mut run);
+                self.note(&best, far, &mut run);
             }
         }
+        let going = Going {
+            best,
+            initial,
+            steps: Steps::new(self.params),
+            slow: 0,
+            fresh_starts: 0,
+            moved,
+        };
+        Ok(self.go_on(going, run))
+    }
+
+    /// Goes on from a checkpoint; none if the drape it left cannot be factored any more.
+    pub(super) fn resume(
+        &self,
+        from: Checkpoint,
+        clock: &Clock,
+        observe: &mut Observer<'_>,
+    ) -> Option<Found> {
+        let mut run = Run::new(clock, observe);
+        run.drapes = from.drapes;
+        run.factorisations = from.factorisations;
+        run.notes.clone_from(&from.notes);
+        let going = Going {
+            best: self.restored(&from)?,
+            initial: from.initial,
+            steps: from.steps,
+            slow: from.slow,
+            fresh_starts: from.fresh_starts,
+            moved: from.moved,
+        };
+        Some(self.go_on(going, run))
+    }
+
+    /// Steps until there is a reason to stop.
+    fn go_on(&self, going: Going<'s>, mut run: Run<'_, '_>) -> Found {
+        let Going {
+            mut best,
+            initial,
+            mut steps,
+            mut slow,
+            mut fresh_starts,
+            mut moved,
+        } = going;
         let floor = quality_floor(self.mesh, LEAST_QUALITY);
-        let mut steps = Steps::new(self.params);
-        let mut slow = 0;
-        let mut fresh_starts = 0;
         let status = loop {
+            if let Some(keep) = self.keep {
+                let checkpoint = Checkpoint {
+                    params: keep.clone(),
+                    x_star: self.x_star.to_vec(),
+                    initial: initial.clone(),
+                    zeta: best.zeta.clone(),
+                    x: best.x.clone(),
+                    gradient: best.gradient.clone(),
+                    adjoint_norm: best.adjoint_norm,
+                    residual: best.residual,
+                    shift: best.shift,
+                    steps: steps.clone(),
+                    slow,
+                    fresh_starts,
+                    moved,
+                    notes: run.notes.clone(),
+                    drapes: run.drapes,
+                    factorisations: run.factorisations,
+                    elapsed: run.clock.elapsed(),
+                };
+                let go_on = (run.observe)(&Progress::Checkpoint(Box::new(checkpoint)));
+                run.go_on &= go_on;
+            }
             if !run.go_on {
                 break Status::Stopped;
             }
             if run.notes.len() > self.params.iterations {
                 break Status::IterationLimit;
             }
-            let settled = slow >= 2 || moved < self.params.least_step;
+            // Short steps by the gradient alone say nothing: the next may be long again.
+            let short = moved.is_some_and(|moved| moved < self.params.least_step);
+            let still = short && matches!(steps, Steps::Newton(_));
+            let settled = slow >= 2 || still;
             let mut stepped = Stepped::NoBetter;
             if !settled {
                 stepped = match &mut steps {
@@ -151,22 +244,20 @@ impl<'s, S: Surface> Search<'s, S> {
             } else {
                 0
             };
-            moved = farthest(&next.x_bar, &best.x_bar);
+            let far = farthest(&next.x_bar, &best.x_bar);
             best = next;
-            self.note(&best, moved, &mut run);
-            if moved == 0.0 {
-                // A fresh start: the same pattern, to be searched from again.
-                moved = f64::INFINITY;
-            }
+            self.note(&best, far, &mut run);
+            // A fresh start moves nothing: the same pattern, to be searched from again.
+            moved = Some(far).filter(|far| *far > 0.0);
         };
-        Ok(Found {
+        Found {
             zeta: best.zeta,
             x_bar: best.x_bar,
             x: best.x,
             initial,
             status,
             iterations: run.notes,
-        })
+        }
     }
 
     /// The initial guess, draped.

@@ -43,6 +43,7 @@ pub(super) fn stiffened<S: Surface>(
             ..*search.params
         },
         fresh_starts: 0,
+        keep: None,
         ..*search
     };
     match search.run(initial, others, clock, observe) {

@@ -264,6 +264,36 @@ impl Drape {
     }
 }
 
+/// The exact stiffness factored at positions that are at rest, whatever way led there; none if no
+/// shift makes it definite.
+pub fn differentiable_at<'a, S: Surface>(
+    scene: &Scene<'a, S>,
+    x_bar: &[Vec2],
+    x: Vec<Vec3>,
+) -> Option<Differentiable<'a>> {
+    let rest = scene.cloth.at_rest(x_bar);
+    let mut layers = Layers::new(scene.cloth, scene.params.layers, &x);
+    let touch = Touch::at(scene.cloth, &mut layers, &x, scene.assembly.clone());
+    let system = system(scene, &rest);
+    let residual = system.residual(&system.force(&x, &touch.pairs));
+    let (factor, shift) = shifted_factor(&system, &touch, &x)?;
+    let drape = Drape {
+        x,
+        x_bar: x_bar.to_vec(),
+        residual,
+        iterations: 0,
+        status: RestStatus::AtRest,
+        rest,
+        layers,
+    };
+    Some(Differentiable {
+        cloth: scene.cloth,
+        drape,
+        factor,
+        shift,
+    })
+}
+
 /// Factor of K + σM with the smallest σ tried that makes it definite, and σ \[1/s²\].
 fn shifted_factor<S: Surface>(
     system: &System<'_, S>,

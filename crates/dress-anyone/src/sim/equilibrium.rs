@@ -126,6 +126,10 @@ const SPARE: f64 = 0.5;
 const EXACT_BELOW: f64 = 3.0;
 /// Damping below which there might as well be none \[1/s²\].
 const LEAST_SIGMA: f64 = 1e-3;
+/// Damping at which a step is so short that energies cannot tell any more \[1/s²\].
+const MOST_SIGMA: f64 = 1e12;
+/// How often the search starts afresh from where no step lowers the energy.
+const FRESH_STARTS: usize = 2;
 /// Below this part of the compressive stress none of it is tried.
 const LEAST_EXACTNESS: f64 = 0.1;
 /// Most by which the part of the compressive stress grows in one iteration.
@@ -160,6 +164,7 @@ pub fn find<S: Surface>(
     let mut centres = vec![centre(&x)];
     let mut status = RestStatus::IterationLimit;
     let mut iterations = 0;
+    let mut fresh_starts = 0;
     loop {
         if !residual.is_finite() {
             status = RestStatus::NotFinite;
@@ -204,11 +209,18 @@ pub fn find<S: Surface>(
         let near = layers.pairs(&x, &direction, 0.0);
         hold_apart(&near, &x, &mut direction);
         let Some(step) = line_search(system, &near, &x, &direction, energy, residual) else {
-            if sigma > 1e12 {
+            if sigma < MOST_SIGMA {
+                sigma = 10.0 * sigma.max(1.0);
+            } else if fresh_starts < FRESH_STARTS {
+                fresh_starts += 1;
+                sigma = params.warm;
+                exactness = 0.0;
+                energy = system.energy(&x, &near);
+                touch.pairs = near;
+            } else {
                 status = RestStatus::Stalled;
                 break;
             }
-            sigma = 10.0 * sigma.max(1.0);
             continue;
         };
         x = step.x;

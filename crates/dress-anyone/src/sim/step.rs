@@ -91,6 +91,7 @@ pub struct Stepper<'a, S> {
 #[derive(Clone, Copy, Debug)]
 struct Touch {
     point: ContactPoint,
+    /// ∂c/∂p: of length one but for the smoothing of the distance.
     normal: Vec3,
     /// c = normal·x − offset.
     offset: f64,
@@ -273,9 +274,9 @@ impl<'a, S: Surface> Stepper<'a, S> {
         for touch in touching {
             let [a, b] = touch.point.ends.map(|a| a as usize);
             let c = touch.normal.dot(&touch.point.at(x)) - touch.offset;
-            let wanted = touch.lambda
-                + (-c - touch.alpha_tilde * touch.lambda)
-                    / (self.inverse_mass(touch) + touch.alpha_tilde);
+            let w = self.inverse_mass(&touch.point) * touch.normal.norm_squared();
+            let wanted =
+                touch.lambda + (-c - touch.alpha_tilde * touch.lambda) / (w + touch.alpha_tilde);
             let delta = wanted.max(0.0) - touch.lambda;
             touch.lambda += delta;
             for a in [a, b] {
@@ -288,8 +289,8 @@ impl<'a, S: Surface> Stepper<'a, S> {
     }
 
     /// Of a contact point \[1/kg\]: ∂p/∂x of an end is ½; a vertex is both its ends.
-    fn inverse_mass(&self, touch: &Touch) -> f64 {
-        let [a, b] = touch.point.ends.map(|a| a as usize);
+    fn inverse_mass(&self, point: &ContactPoint) -> f64 {
+        let [a, b] = point.ends.map(|a| a as usize);
         if a == b {
             self.w[a]
         } else {
@@ -305,7 +306,7 @@ impl<'a, S: Surface> Stepper<'a, S> {
         let touch = |point: &ContactPoint| {
             let p = point.at(x);
             let (d, gradient) = self.surface.distance(p).filter(|(d, _)| *d < reach)?;
-            let normal = gradient.try_normalize(1e-3)?;
+            let normal = slope(gradient)?;
             let kappa = self.contact.stiffness * point.area;
             Some(Touch {
                 point: *point,
@@ -316,6 +317,19 @@ impl<'a, S: Surface> Stepper<'a, S> {
             })
         };
         self.cloth.contacts.iter().filter_map(touch).collect()
+    }
+}
+
+/// Slope of the distance below which it is that of a crease deep in the body \[–\].
+const CREASE: f64 = 0.5;
+
+/// The gradient of the distance as the contact takes it: as it is, so that the rest state is that of
+/// the energy; made a unit vector in creases, where it fades; none where there is no direction.
+fn slope(gradient: Vec3) -> Option<Vec3> {
+    if gradient.norm() > CREASE {
+        Some(gradient)
+    } else {
+        gradient.try_normalize(1e-3)
     }
 }
 

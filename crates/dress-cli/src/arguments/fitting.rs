@@ -97,10 +97,12 @@ impl FittingArguments {
             Some(OptimizerKind::Lm) => descent.optimizer = Optimizer::Lm,
             Some(OptimizerKind::Lbfgs) => descent.optimizer = Optimizer::Lbfgs,
             Some(OptimizerKind::Descent) => descent.optimizer = Optimizer::Descent,
-            None if self.gradient.is_some() && descent.gradient == Gradient::Trajectory => {
-                if descent.optimizer == Optimizer::Lm {
-                    descent.optimizer = Optimizer::Descent;
-                }
+            // What was asked for by name decides; a default of the parameters gives way.
+            None if self.gradient.is_some()
+                && descent.gradient == Gradient::Trajectory
+                && descent.optimizer == Optimizer::Lm =>
+            {
+                descent.optimizer = Optimizer::Descent;
             }
             None => {}
         }

@@ -4,3 +4,4 @@
 mod bad_input;
 mod fixtures;
 mod good_input;
+mod gradient;

@@ -5,8 +5,9 @@ use super::{Run, Search};
 use crate::descent::Gradient;
 use crate::geometry::{Vec2, Vec3};
 use crate::loss::Loss;
+use crate::refit::checkpoint::Checkpoint;
 use crate::refit::{Progress, RefitError};
-use crate::sim::drape::Differentiable;
+use crate::sim::drape::{Differentiable, differentiable_at};
 use crate::sim::energy::contact::Surface;
 use crate::sim::equilibrium::RestStatus;
 use crate::sim::{Start, Trajectory, drape};
@@ -124,13 +125,11 @@ impl<'s, S: Surface> Search<'s, S> {
             Gradient::Trajectory => self.path(&x_bar, start, run)?,
         };
         let loss = self.losses.evaluate(end.x(), &x_bar);
-        let priors = self.priors(&zeta);
-        let total = loss.total + priors.iter().map(|p| p.value * p.value).sum::<f64>();
         Ok(Candidate {
+            total: self.total(&loss, &zeta),
             zeta,
             end,
             loss,
-            total,
         })
     }
 
@@ -189,8 +188,15 @@ impl<'s, S: Surface> Search<'s, S> {
         (gradient, adjoint_norm)
     }
 
-    /// The candidate with its gradient.
-    pub(super) fn accept(&self, candidate: Candidate<'s, S>) -> Box<Point<'s>> {
+    /// The candidate with its gradient. Its stiffness is factored anew from its positions alone, so
+    /// that a resumed search goes on with the same bits.
+    pub(super) fn accept(&self, mut candidate: Candidate<'s, S>) -> Box<Point<'s>> {
+        if let End::Rest(state) = &mut candidate.end {
+            let (x, x_bar) = (state.drape.x.clone(), state.drape.x_bar.clone());
+            if let Some(anew) = differentiable_at(self.scene, &x_bar, x) {
+                **state = anew;
+            }
+        }
         let (gradient, adjoint_norm) = self.gradient(&candidate);
         let end = candidate.end;
         let (x, x_bar, residual) = (end.x().to_vec(), end.x_bar().to_vec(), end.residual());
@@ -210,5 +216,37 @@ impl<'s, S: Surface> Search<'s, S> {
             shift: state.as_ref().map_or(0.0, |state| state.shift),
             state,
         })
+    }
+
+    /// The point that a checkpoint was made at; none if its stiffness cannot be factored.
+    pub(super) fn restored(&self, from: &Checkpoint) -> Option<Box<Point<'s>>> {
+        let x_bar = self.cages.deform(&from.zeta);
+        let state = match self.params.gradient {
+            Gradient::Equilibrium => Some(Box::new(differentiable_at(
+                self.scene,
+                &x_bar,
+                from.x.clone(),
+            )?)),
+            Gradient::Trajectory => None,
+        };
+        let loss = self.losses.evaluate(&from.x, &x_bar);
+        Some(Box::new(Point {
+            total: self.total(&loss, &from.zeta),
+            zeta: from.zeta.clone(),
+            x: from.x.clone(),
+            x_bar,
+            loss,
+            gradient: from.gradient.clone(),
+            adjoint_norm: from.adjoint_norm,
+            residual: from.residual,
+            shift: from.shift,
+            state,
+        }))
+    }
+
+    /// Weighted loss with the cages' priors.
+    fn total(&self, loss: &Loss, zeta: &[f64]) -> f64 {
+        let priors = self.priors(zeta);
+        loss.total + priors.iter().map(|p| p.value * p.value).sum::<f64>()
     }
 }

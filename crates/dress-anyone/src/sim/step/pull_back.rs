@@ -7,7 +7,7 @@
 //! r̂ = A⁻¹ Δλ̂ no derivative of A⁻¹ is ever formed. The functions stand in the order of those they
 //! differentiate, in `step.rs`. Layers of cloth are left out: the cloth must not feel itself.
 
-use super::{State, Stepper, Tape, Touch};
+use super::{CREASE, State, Stepper, Tape, Touch};
 use crate::geometry::{Mat2, Vec2, Vec3};
 use crate::sim::cloth::{Cloth, Rest};
 use crate::sim::energy::contact::Surface;
@@ -216,14 +216,16 @@ impl<S: Surface> Stepper<'_, S> {
             let after_hat = back.contact[e] + delta_hat;
             back.contact[e] = -delta_hat;
             if after > 0.0 {
-                let system = self.inverse_mass(touch) + touch.alpha_tilde;
-                let r_hat = after_hat / system;
+                let w = self.inverse_mass(&touch.point);
+                let squared = touch.normal.norm_squared();
+                let r_hat = after_hat / (w * squared + touch.alpha_tilde);
                 back.contact[e] += after_hat - touch.alpha_tilde * r_hat;
                 back.normal[e] -= touch.point.at(&back.x) * r_hat;
+                back.normal[e] -= touch.normal * (2.0 * w * r_hat * delta);
                 back.offset[e] += r_hat;
                 let share = if ends[0] == ends[1] { 0.5 } else { 0.25 };
                 for a in ends {
-                    back.rest.w[a] -= share * r_hat * delta;
+                    back.rest.w[a] -= share * squared * r_hat * delta;
                     back.x_hat[a] -= touch.normal * (0.5 * r_hat);
                 }
             }
@@ -242,7 +244,12 @@ impl<S: Surface> Stepper<'_, S> {
                 continue;
             };
             let n_hat = n_hat + p * offset_hat;
-            let by_gradient = (n_hat - normal * normal.dot(&n_hat)) / gradient.norm();
+            let length = gradient.norm();
+            let by_gradient = if length > CREASE {
+                n_hat
+            } else {
+                (n_hat - normal * normal.dot(&n_hat)) / length
+            };
             let p_hat = (normal - gradient) * offset_hat + self.surface.curvature(p) * by_gradient;
             for a in point.ends {
                 before_hat[a as usize] += p_hat * 0.5;

@@ -4,10 +4,8 @@
 
 use super::*;
 use crate::geometry::Mat2;
-use crate::sim::drape::Start;
-use crate::sim::equilibrium::RestStatus;
+use crate::sim::adjoint;
 use crate::sim::step::StepParams;
-use crate::sim::{Hold, adjoint, drape};
 use nalgebra::{DMatrix, DVector};
 
 /// A cloth, what it hangs on, and how it is stepped.
@@ -280,75 +278,5 @@ fn the_papers_adjoint_by_sweeps() {
             format!("{error:.1e}, {cosine:.4}")
         });
         println!("| 1/{frames} | {sweeps} | {} | {} |", cells[0], cells[1]);
-    }
-}
-
-/// A tight tube at rest on a leaning cone: trajectories from there, and the equilibrium's adjoint.
-fn against_equilibrium(frames: u32, sweeps: usize, seconds: f64, drag: f64) -> (f64, f64, f64) {
-    let mut mesh = fixtures::tube(12, 3, 0.05);
-    for p in &mut mesh.x_bar {
-        p.y *= 1.0 + 0.2 * (std::f64::consts::TAU * p.x / 0.6).sin();
-    }
-    let cloth = Cloth::new(&mesh, &SOFT);
-    let cone = Cone {
-        radius: 0.1,
-        slope: 0.3,
-        flat: 1.1,
-        lean: 0.2,
-    };
-    let mut params = stepped(1.0 / f64::from(frames), sweeps);
-    params.step.drag = drag;
-    params.layers.on = false;
-    params.contact = ContactParams {
-        thickness: 0.003,
-        stiffness: 1e5,
-    };
-    let scene = Scene {
-        cloth: &cloth,
-        assembly: &Assembly::new(&cloth),
-        surface: &cone,
-        params: &params,
-    };
-    let x = fixtures::rolled(&mesh, 0.6, 0.11);
-    let found = drape(&scene, &mesh.x_bar, x, Start::Near, &mut |_| true);
-    assert_eq!(found.status, RestStatus::AtRest);
-    let rest = found.differentiable(&scene).expect("a minimum");
-    let weights = weights(cloth.vertex_count);
-    let (expected, _) = rest.pull_back(&weights);
-    let steps = (seconds * f64::from(frames)) as usize;
-    let run = Trajectory::run(
-        &scene,
-        &mesh.x_bar,
-        rest.drape.x.clone(),
-        steps,
-        &mut |_| true,
-    )
-    .expect("not stopped");
-    let moved = run.x().iter().zip(&rest.drape.x);
-    let moved = moved.map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
-    let gap = apart(&run.pull_back(&weights).x_bar, &expected).0;
-    (run.residual(), moved, gap)
-}
-
-/// `cargo test -p dress-anyone --lib -- --ignored --nocapture both_adjoints_by_sweeps`.
-#[test]
-#[ignore = "prints a table of docs/validation.md"]
-fn both_adjoints_by_sweeps() {
-    println!("| Δt, s | sweeps | time, s | drag | residual | off, mm | adjoints apart |");
-    for (frames, sweeps, seconds, drag) in [
-        (60, 20, 1.5, 3.1),
-        (120, 12, 1.5, 3.1),
-        (60, 500, 2.0, 20.0),
-        (240, 100, 2.0, 20.0),
-        (240, 1000, 2.0, 20.0),
-        (960, 20, 2.0, 20.0),
-        (960, 100, 2.0, 20.0),
-        (960, 400, 2.0, 20.0),
-    ] {
-        let (residual, moved, gap) = against_equilibrium(frames, sweeps, seconds, drag);
-        let moved = 1e3 * moved;
-        println!(
-            "| 1/{frames} | {sweeps} | {seconds} | {drag} | {residual:.1e} | {moved:.1e} | {gap:.1e} |"
-        );
     }
 }

@@ -1,0 +1,61 @@
+//! A search as it stands after an accepted step: enough to go on from there to the same bits.
+//!
+//! What follows from the inputs is made again on resuming; the search itself, from its best guess on,
+//! is not. A checkpoint knows what it was made from, and is refused with anything else.
+
+use super::RefitParams;
+use super::search::Steps;
+use crate::geometry::Vec3;
+use crate::report::Iteration;
+use nalgebra::DVector;
+use serde::{Deserialize, Serialize};
+
+/// The state of a search.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Checkpoint {
+    /// The parameters of the refit.
+    pub(super) params: RefitParams,
+    /// The target shape \[m\], which follows from garment and bodies.
+    pub(super) x_star: Vec<Vec3>,
+    /// The drape of the initial guess \[m\].
+    pub(super) initial: Vec<Vec3>,
+    /// The best pattern's unknowns \[m\], its drape \[m\], and the gradient there \[1/m\].
+    pub(super) zeta: Vec<f64>,
+    pub(super) x: Vec<Vec3>,
+    pub(super) gradient: DVector<f64>,
+    pub(super) adjoint_norm: f64,
+    pub(super) residual: f64,
+    pub(super) shift: f64,
+    /// What makes the steps, and what it has learned.
+    pub(super) steps: Steps,
+    /// Steps in a row that hardly lowered the loss.
+    pub(super) slow: usize,
+    pub(super) fresh_starts: usize,
+    /// Farthest move of the last step \[m\]; none where it says nothing.
+    pub(super) moved: Option<f64>,
+    pub(super) notes: Vec<Iteration>,
+    pub(super) drapes: usize,
+    pub(super) factorisations: usize,
+    /// Seconds that the refit had taken.
+    pub(super) elapsed: f64,
+}
+
+impl Checkpoint {
+    /// Accepted steps so far.
+    pub fn iterations(&self) -> usize {
+        self.notes.len().saturating_sub(1)
+    }
+
+    /// Whether it is of this refit: same parameters, same target shape to the last bit, and
+    /// everything of the size it should have.
+    pub(super) fn is_of(&self, params: &RefitParams, x_star: &[Vec3], unknowns: usize) -> bool {
+        let count = x_star.len();
+        self.params == *params
+            && self.x_star == x_star
+            && [self.initial.len(), self.x.len()] == [count; 2]
+            && [self.zeta.len(), self.gradient.len()] == [unknowns; 2]
+            && self.steps.is_of(unknowns)
+            && !self.notes.is_empty()
+    }
+}

@@ -1,0 +1,86 @@
+//! The search from coarse to fine: in a coarse mesh of the garment from three guesses, then in the
+//! garment's own mesh from what that found. Not in the paper, which has one mesh and one guess.
+
+use super::prepare::Prepared;
+use super::search::Search;
+use super::{Clock, Found, Observer, Progress, RefitError, flatten, stiffen};
+use crate::descent::{DescentParams, Gradient};
+use crate::report::Status;
+
+/// The best pattern, searched for in a coarse mesh of the garment first if it is fine. What the
+/// coarse search ends with is a guess; the search in the garment's own mesh decides.
+pub(super) fn searched(
+    prepared: &Prepared<'_>,
+    clock: &mut Clock,
+    observe: &mut Observer<'_>,
+) -> Result<Found, RefitError> {
+    if let Some(garment) = prepared.coarser() {
+        let stages = [
+            "search in stiffer cloth, coarse mesh",
+            "search, coarse mesh",
+        ];
+        // There is no going on from within it.
+        let mut unkept = |told: &Progress| matches!(told, Progress::Checkpoint(_)) || observe(told);
+        match explored(&prepared.on_mesh_of(&garment)?, stages, clock, &mut unkept) {
+            Ok(coarse) => return finished(prepared, coarse, clock, observe),
+            // Not in so coarse a mesh.
+            Err(RefitError::NotAtRest { .. }) => {}
+            Err(error) => return Err(error),
+        }
+    }
+    explored(
+        prepared,
+        ["search in stiffer cloth", "search"],
+        clock,
+        observe,
+    )
+}
+
+/// The search in the garment's own mesh, from what the `coarse` one found. If that was interrupted,
+/// its pattern is draped and taken.
+fn finished(
+    prepared: &Prepared<'_>,
+    coarse: Found,
+    clock: &mut Clock,
+    observe: &mut Observer<'_>,
+) -> Result<Found, RefitError> {
+    clock.stage("search", observe);
+    let scene = prepared.scene();
+    let search = prepared.search(&scene);
+    let (initial, guesses) = (prepared.initial(), vec![coarse.zeta]);
+    if coarse.status != Status::Stopped {
+        return search.run(initial, guesses, clock, observe);
+    }
+    let no_further = DescentParams {
+        iterations: 0,
+        ..prepared.params.descent
+    };
+    let search = Search {
+        params: &no_further,
+        fresh_starts: 0,
+        ..search
+    };
+    let mut found = search.run(initial, guesses, clock, &mut |_| true)?;
+    found.status = Status::Stopped;
+    Ok(found)
+}
+
+/// The best pattern, from the best of three guesses.
+fn explored(
+    prepared: &Prepared<'_>,
+    [in_stiffer_cloth, in_its_own]: [&'static str; 2],
+    clock: &mut Clock,
+    observe: &mut Observer<'_>,
+) -> Result<Found, RefitError> {
+    let scene = prepared.scene();
+    let search = prepared.search(&scene);
+    let initial = prepared.initial();
+    let mut guesses = vec![flatten::flatten(prepared)];
+    if prepared.params.descent.gradient == Gradient::Equilibrium {
+        clock.stage(in_stiffer_cloth, observe);
+        let third = stiffen::stiffened(&search, initial.clone(), guesses.clone(), clock, observe)?;
+        guesses.extend(third);
+    }
+    clock.stage(in_its_own, observe);
+    search.run(initial, guesses, clock, observe)
+}
