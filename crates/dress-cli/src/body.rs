@@ -51,16 +51,21 @@ fn read(subject: &SubjectArguments) -> Result<(BodyModel, Body), Failure> {
 
 /// The model fitted to the file's body.
 fn fitted(model: &BodyModel, body: &Body, subject: &SubjectArguments) -> Result<Fit, Failure> {
-    let landmarks = match &subject.landmarks {
-        Some(path) => read_landmarks(model, body, path)?,
-        None => Landmarks::default(),
-    };
+    let landmarks = landmarks(model, body, subject.landmarks.as_deref())?;
     let fit = dress_anyone::body_model::fit::fit(model, &body.mesh, &landmarks);
     Ok(fit.map_err(|problems| BadInput::new(&subject.file.file, problems))?)
 }
 
-/// The landmarks in a TOML file, which has them in the unit and axes of the body's file.
-fn read_landmarks(model: &BodyModel, body: &Body, path: &Path) -> Result<Landmarks, BadInput> {
+/// The landmarks in a TOML file, which has them in the unit and axes of the body's file; none
+/// without a file.
+pub fn landmarks(
+    model: &BodyModel,
+    body: &Body,
+    path: Option<&Path>,
+) -> Result<Landmarks, BadInput> {
+    let Some(path) = path else {
+        return Ok(Landmarks::default());
+    };
     let no_place = Vec3::repeat(f64::NAN);
     let named: Vec<(String, Vec3)> = table::vectors(path, "landmarks")?
         .into_iter()

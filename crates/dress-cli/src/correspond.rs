@@ -1,7 +1,7 @@
 //! The bodies of a refit made to correspond: as they are where they do, else by the body model.
 
-use crate::body::arguments::ModelArguments;
-use crate::body::model;
+use crate::arguments::fitting::CorrespondArguments;
+use crate::body::{landmarks, model};
 use crate::failure::Failure;
 use crate::progress::Progress;
 use dress_anyone::body::Body;
@@ -10,7 +10,7 @@ use dress_anyone::body_model::fit::FitReport;
 use dress_anyone::geometry::TriangleMesh;
 use dress_anyone::problem::BadInput;
 use serde::Serialize;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Two bodies that correspond.
 pub struct Corresponding {
@@ -36,7 +36,7 @@ pub enum How {
 
 /// Fits the model to both bodies unless they share topology and pose; tells which.
 pub fn correspond(
-    model_arguments: &ModelArguments,
+    arguments: &CorrespondArguments,
     names: [&Path; 2],
     source: Body,
     target: Body,
@@ -61,8 +61,13 @@ pub fn correspond(
         "different meshes: the body model is fitted to both"
     };
     note(progress, why);
-    let model = model(model_arguments)?;
-    let alike = make_alike(&model, &source, &target).map_err(|problems| {
+    let model = model(&arguments.model)?;
+    let marked = |body: &Body, file: &Option<PathBuf>| landmarks(&model, body, file.as_deref());
+    let landmarks = [
+        marked(&source, &arguments.source_landmarks)?,
+        marked(&target, &arguments.target_landmarks)?,
+    ];
+    let alike = make_alike(&model, [&source, &target], &landmarks).map_err(|problems| {
         let bad = names
             .into_iter()
             .zip(problems)

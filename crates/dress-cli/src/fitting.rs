@@ -63,7 +63,7 @@ impl<'a> Inputs<'a> {
         progress.notes(&target.name, &target.notes);
         let files = [names[1], names[2]].map(|name| name.name());
         let files = [Path::new(&files[0]), Path::new(&files[1])];
-        let alike = correspond(&arguments.model, files, source, target, progress)?;
+        let alike = correspond(&arguments.correspond, files, source, target, progress)?;
         Ok(Self {
             names,
             params,

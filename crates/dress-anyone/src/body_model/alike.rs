@@ -27,9 +27,17 @@ pub struct Alike {
 /// What is wrong with the source, and with the target.
 pub type Refusal = [Vec<Problem>; 2];
 
-/// Fits `model` to both bodies and gives the target the source's pose.
-pub fn make_alike(model: &BodyModel, source: &Body, target: &Body) -> Result<Alike, Refusal> {
-    let fits = [source, target].map(|body| fit(model, &body.mesh, &Landmarks::default()));
+/// Fits `model` to both bodies, with what landmarks there are on each, and gives the target the
+/// source's pose.
+pub fn make_alike(
+    model: &BodyModel,
+    [source, target]: [&Body; 2],
+    landmarks: &[Landmarks; 2],
+) -> Result<Alike, Refusal> {
+    let fits = [
+        fit(model, &source.mesh, &landmarks[0]),
+        fit(model, &target.mesh, &landmarks[1]),
+    ];
     let [source_fit, target_fit] = match fits {
         [Ok(source), Ok(target)] => [source, target],
         refused => return Err(refused.map(|fit| fit.err().unwrap_or_default())),

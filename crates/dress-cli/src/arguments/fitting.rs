@@ -35,15 +35,29 @@ pub struct FittingArguments {
     /// What makes the steps [default: lm; descent where the gradient is the trajectory's]
     #[arg(long, value_name = "KIND")]
     pub optimizer: Option<OptimizerKind>,
-    /// The model by which bodies of different meshes or poses are made to correspond.
+    /// How bodies are made to correspond.
     #[command(flatten)]
-    pub model: ModelArguments,
+    pub correspond: CorrespondArguments,
     /// How to read the files.
     #[command(flatten)]
     pub reading: ReadingArguments,
     /// How to run.
     #[command(flatten)]
     pub running: RunningArguments,
+}
+
+/// How bodies of different meshes or poses are made to correspond.
+#[derive(Debug, Args)]
+pub struct CorrespondArguments {
+    /// The model that is fitted to both.
+    #[command(flatten)]
+    pub model: ModelArguments,
+    /// Landmarks on the source body, as for `dress body fit --landmarks`
+    #[arg(long, value_name = "FILE")]
+    pub source_landmarks: Option<PathBuf>,
+    /// Landmarks on the target body
+    #[arg(long, value_name = "FILE")]
+    pub target_landmarks: Option<PathBuf>,
 }
 
 /// [`CageKind`].
