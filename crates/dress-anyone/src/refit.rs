@@ -13,6 +13,7 @@ mod measure;
 mod prepare;
 mod search;
 mod stiffen;
+pub mod transfer;
 mod written;
 
 use crate::body::Body;

@@ -12,7 +12,7 @@ use dress_anyone::io::garment_obj::UvOptions;
 use dress_anyone::io::garmentcode::RotationOrder;
 use dress_anyone::problem::BadInput;
 use dress_anyone::sim::Solver;
-use fitting::FittingArguments;
+use fitting::{FittingArguments, PairArguments};
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
@@ -32,6 +32,8 @@ pub enum Command {
     Refit(RefitArguments),
     /// Compare the gradient of a refit's loss with differences of complete drapes.
     CheckGradient(CheckGradientArguments),
+    /// Carry a garment's drape to another body: the shape that a refit aims for, without a pattern.
+    Transfer(TransferArguments),
     /// Drape a garment on a body.
     Drape(DrapeArguments),
     /// Tell what is in a garment or body file, and what is wrong with it.
@@ -61,6 +63,20 @@ pub struct RefitArguments {
     /// Go on from what an interrupted refit of the same noted in this folder, and note further steps there
     #[arg(long, value_name = "FOLDER", conflicts_with = "checkpoint")]
     pub resume: Option<PathBuf>,
+}
+
+/// `dress transfer`.
+#[derive(Debug, Args)]
+pub struct TransferArguments {
+    /// Garment and bodies.
+    #[command(flatten)]
+    pub pair: PairArguments,
+    /// Folder for the results
+    #[arg(long, value_name = "FOLDER", default_value = "dress-out")]
+    pub out: PathBuf,
+    /// What becomes of the room between garment and body [default: absolute]
+    #[arg(long, value_name = "KIND")]
+    pub ease: Option<EaseKind>,
 }
 
 /// `dress check-gradient`.
@@ -389,4 +405,13 @@ mod tests {
             assert!(Arguments::try_parse_from(line.split_whitespace()).is_err());
         }
     }
+}
+
+/// [`dress_anyone::transfer::Ease`].
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub enum EaseKind {
+    /// Kept in metres
+    Absolute,
+    /// Grows with the body
+    Relative,
 }

@@ -11,8 +11,13 @@ use std::sync::atomic::Ordering;
 
 /// Compares; the table.
 pub fn run(arguments: &CheckGradientArguments) -> Result<String, Failure> {
-    let mut progress = Progress::new(arguments.fitting.running.quiet);
-    let inputs = Inputs::read(&arguments.fitting, None, &mut progress)?;
+    let mut progress = Progress::new(arguments.fitting.pair.running.quiet);
+    let inputs = Inputs::read(
+        &arguments.fitting.pair,
+        arguments.fitting.params(),
+        None,
+        &mut progress,
+    )?;
     let stop = stop_on_ctrl_c().context("Ctrl-C cannot be listened to")?;
     let checked = check_gradient(
         &inputs.loaded.garment,

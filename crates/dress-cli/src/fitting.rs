@@ -1,6 +1,6 @@
 //! Garment, bodies and parameters of a refit, read and made to correspond.
 
-use crate::arguments::fitting::FittingArguments;
+use crate::arguments::fitting::PairArguments;
 use crate::correspond::{How, correspond};
 use crate::failure::Failure;
 use crate::inputs::{AVERAGE, Gathering, HEAVY, Input, TSHIRT};
@@ -35,7 +35,8 @@ pub struct Inputs<'a> {
 impl<'a> Inputs<'a> {
     /// Reads all inputs, and looks whether results can be written to `out`, before complaining of any.
     pub fn read(
-        arguments: &'a FittingArguments,
+        arguments: &'a PairArguments,
+        params: Result<Params, BadInput>,
         out: Option<&Path>,
         progress: &mut Progress,
     ) -> Result<Self, Failure> {
@@ -45,7 +46,7 @@ impl<'a> Inputs<'a> {
             Input::or(arguments.target_body.as_ref(), HEAVY),
         ];
         let mut gathering = Gathering::default();
-        let params = gathering.take(arguments.params());
+        let params = gathering.take(params);
         let options = arguments
             .reading
             .garment(params.as_ref().unwrap_or(&Params::default()));

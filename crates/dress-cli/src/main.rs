@@ -24,6 +24,7 @@ mod progress;
 mod refit;
 mod show;
 mod summary;
+mod transfer;
 
 use anyhow::Context;
 use arguments::{Arguments, Command, RunningArguments};
@@ -56,12 +57,16 @@ fn main() -> ExitCode {
 fn run(command: &Command) -> Result<String, Failure> {
     match command {
         Command::Refit(arguments) => {
-            set_threads(&arguments.fitting.running)?;
+            set_threads(&arguments.fitting.pair.running)?;
             refit::run(arguments)
         }
         Command::CheckGradient(arguments) => {
-            set_threads(&arguments.fitting.running)?;
+            set_threads(&arguments.fitting.pair.running)?;
             check_gradient::run(arguments)
+        }
+        Command::Transfer(arguments) => {
+            set_threads(&arguments.pair.running)?;
+            transfer::run(arguments)
         }
         Command::Drape(arguments) => {
             set_threads(&arguments.running)?;

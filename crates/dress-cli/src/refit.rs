@@ -26,9 +26,14 @@ use std::sync::atomic::Ordering;
 
 /// Refits; what to say about it in the end.
 pub fn run(arguments: &RefitArguments) -> Result<String, Failure> {
-    let quiet = arguments.fitting.running.quiet;
+    let quiet = arguments.fitting.pair.running.quiet;
     let mut progress = Progress::new(quiet);
-    let inputs = Inputs::read(&arguments.fitting, Some(&arguments.out), &mut progress)?;
+    let inputs = Inputs::read(
+        &arguments.fitting.pair,
+        arguments.fitting.params(),
+        Some(&arguments.out),
+        &mut progress,
+    )?;
     let stop = stop_on_ctrl_c().context("Ctrl-C cannot be listened to")?;
     let folder = arguments.resume.as_ref().or(arguments.checkpoint.as_ref());
     let from = arguments.resume.as_deref().map(checkpoint::read);

@@ -150,7 +150,8 @@ pub fn drape_report(
 }
 
 /// Singular values of a deformation gradient, smaller first.
-fn principal_stretches(f: &crate::sim::energy::membrane::Mat3x2) -> [f64; 2] {
+/// Least and largest stretch of a deformation gradient.
+pub(super) fn principal_stretches(f: &crate::sim::energy::membrane::Mat3x2) -> [f64; 2] {
     let c = f.transpose() * f;
     let mean = 0.5 * c.trace();
     let radius = (0.25 * (c.m11 - c.m22).powi(2) + c.m12 * c.m12).sqrt();

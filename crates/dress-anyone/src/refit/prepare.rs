@@ -15,7 +15,7 @@ use crate::pattern::resample::resample;
 use crate::pattern::symmetry::Symmetry;
 use crate::pattern::triangulate;
 use crate::sim::{Assembly, Cloth, Scene};
-use crate::transfer::target_shape;
+use crate::transfer::{Target, target_shape};
 use std::sync::Arc;
 
 /// A mesh of less than this many times the coarse one's vertices is searched at once.
@@ -56,19 +56,8 @@ impl<'a> Prepared<'a> {
             return Err(RefitError::Garment(problems));
         }
         let mesh = &garment.mesh;
-
-        // The drape on the source body: the file's own, or from the placed panels.
-        clock.stage("source drape", observe);
-        let source_drape = match &garment.drape {
-            Some(x) => x.clone(),
-            None => drape_to_rest(garment, source, params, observe)?,
-        };
-
-        // §4.2: the shape to aim for.
-        clock.stage("target shape", observe);
-        let outward = mesh.outward_triangles();
-        let x_star =
-            target_shape(&source_drape, &outward, source, target, &params.transfer)?.x_star;
+        let (source_drape, aim) = carried(garment, [source, target], params, clock, observe)?;
+        let x_star = aim.x_star;
 
         clock.stage("target body", observe);
         let surface =
@@ -188,6 +177,26 @@ impl<'a> Prepared<'a> {
     pub(super) fn initial(&self) -> Vec<f64> {
         self.cages.scaled(self.scale)
     }
+}
+
+/// The garment on the source body — as its file has it, or from the placed panels — and the shape to
+/// aim for on the target (§4.2).
+pub(super) fn carried(
+    garment: &Garment,
+    [source, target]: [&Body; 2],
+    params: &RefitParams,
+    clock: &mut Clock,
+    observe: &mut Observer<'_>,
+) -> Result<(Vec<Vec3>, Target), RefitError> {
+    clock.stage("source drape", observe);
+    let source_drape = match &garment.drape {
+        Some(x) => x.clone(),
+        None => drape_to_rest(garment, source, params, observe)?,
+    };
+    clock.stage("target shape", observe);
+    let outward = garment.mesh.outward_triangles();
+    let aim = target_shape(&source_drape, &outward, source, target, &params.transfer)?;
+    Ok((source_drape, aim))
 }
 
 /// The uniform scale of the initial guess (§4.6, corrected): √ of the growth of the cloth's area

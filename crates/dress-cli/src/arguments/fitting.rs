@@ -10,9 +10,9 @@ use dress_anyone::descent::{Gradient, Optimizer};
 use dress_anyone::problem::BadInput;
 use std::path::PathBuf;
 
-/// A garment, the body it fits, the body that it shall fit, and how.
+/// A garment, the body it fits, and the body that it shall fit.
 #[derive(Debug, Args)]
-pub struct FittingArguments {
+pub struct PairArguments {
     /// GarmentCode pattern (JSON), or drape in OBJ with its pattern as texture coordinates
     /// [default: a T-shirt that is built in]
     #[arg(long, value_name = "FILE", requires = "source_body")]
@@ -23,6 +23,23 @@ pub struct FittingArguments {
     /// The body that it shall fit, of any mesh and pose [default: built in]
     #[arg(long, value_name = "FILE")]
     pub target_body: Option<PathBuf>,
+    /// How bodies are made to correspond.
+    #[command(flatten)]
+    pub correspond: CorrespondArguments,
+    /// How to read the files.
+    #[command(flatten)]
+    pub reading: ReadingArguments,
+    /// How to run.
+    #[command(flatten)]
+    pub running: RunningArguments,
+}
+
+/// The same, and how to search.
+#[derive(Debug, Args)]
+pub struct FittingArguments {
+    /// Garment and bodies.
+    #[command(flatten)]
+    pub pair: PairArguments,
     /// What the cages that deform the panels can do
     #[arg(long, value_name = "KIND")]
     pub cage: Option<Cage>,
@@ -35,15 +52,6 @@ pub struct FittingArguments {
     /// What makes the steps [default: lm; descent where the gradient is the trajectory's]
     #[arg(long, value_name = "KIND")]
     pub optimizer: Option<OptimizerKind>,
-    /// How bodies are made to correspond.
-    #[command(flatten)]
-    pub correspond: CorrespondArguments,
-    /// How to read the files.
-    #[command(flatten)]
-    pub reading: ReadingArguments,
-    /// How to run.
-    #[command(flatten)]
-    pub running: RunningArguments,
 }
 
 /// How bodies of different meshes or poses are made to correspond.
@@ -92,7 +100,7 @@ pub enum OptimizerKind {
 impl FittingArguments {
     /// The parameters: the file's, overridden by the command line.
     pub fn params(&self) -> Result<Params, BadInput> {
-        let mut params = self.reading.params()?;
+        let mut params = self.pair.reading.params()?;
         match self.cage {
             Some(Cage::Green) => params.refit.cage.kind = CageKind::Green,
             Some(Cage::GreenAffine) => params.refit.cage.kind = CageKind::GreenAffine,

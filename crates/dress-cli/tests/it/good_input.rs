@@ -71,6 +71,32 @@ fn a_cloth_laid_on_a_box_is_draped_and_told_of() {
 }
 
 #[test]
+fn a_garment_carried_to_the_body_it_fits_stays_as_it_was() {
+    let place = Workplace::new();
+    let bodies = ["--source-body", "body.obj", "--target-body", "body.obj"];
+    let line = ["transfer", "--garment", "tee.json", "--resolution", "35"];
+    let ran = place.dress(&[&line[..], &bodies, &["--out", "out"]].concat());
+    assert_eq!(ran.code, 0, "{}", ran.stderr);
+    assert!(ran.stdout.contains("0 triangles"), "{}", ran.stdout);
+    let report = report(&place);
+    for side in [0, 1] {
+        for part in ["least", "most"] {
+            let stretch = report["stretch"][side][part].as_f64().unwrap();
+            // A tenth of a millimetre on edges of 35 mm.
+            assert!((stretch - 1.0).abs() < 3e-3, "{part} {stretch}");
+        }
+    }
+    assert_eq!(report["turned_over"], 0);
+    for panel in report["spacing"].as_array().unwrap() {
+        let [before, after] = ["before", "after"].map(|k| panel[k]["median"].as_f64().unwrap());
+        assert!((before - after).abs() < 1e-4, "{before} {after}");
+    }
+    for name in ["target.obj", "body.obj", "preview.png"] {
+        assert!(place.path("out").join(name).is_file(), "{name}");
+    }
+}
+
+#[test]
 fn a_pattern_is_told_by_panels_seams_and_free_edges() {
     let ran = Workplace::new().dress(&["inspect", &shipped("garments/tshirt.json")]);
     assert_eq!(ran.code, 0, "{}", ran.stderr);
