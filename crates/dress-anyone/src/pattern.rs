@@ -8,6 +8,7 @@ pub mod curve;
 mod interior;
 pub mod mesh;
 pub mod outline;
+pub mod resample;
 mod sew;
 #[cfg(test)]
 #[allow(clippy::unwrap_used)]

@@ -24,7 +24,6 @@ use crate::pattern::Pattern;
 use crate::problem::Problem;
 use crate::report::{Report, StageTime, Status};
 use crate::sim::drape::DrapeProgress;
-use crate::sim::energy::contact::Surface;
 use crate::sim::equilibrium::RestStatus;
 use crate::sim::{SimParams, Start, drape};
 use crate::transfer::{TransferError, TransferParams};
@@ -32,6 +31,7 @@ use checkpoint::Checkpoint;
 use dress::{HoldParams, drape_on};
 pub use measure::drape_report;
 use prepare::Prepared;
+use search::Search;
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
 
@@ -58,6 +58,9 @@ pub struct RefitParams {
     pub loss: LossParams,
     /// The search.
     pub descent: DescentParams,
+    /// Vertices of the mesh that is searched first, from which the garment's own mesh takes over;
+    /// 0 for none. The paper has none.
+    pub coarse: usize,
 }
 
 impl Default for RefitParams {
@@ -72,6 +75,7 @@ impl Default for RefitParams {
             cage: CageParams::default(),
             loss: LossParams::default(),
             descent: DescentParams::default(),
+            coarse: 800,
         }
     }
 }
@@ -194,24 +198,10 @@ pub fn refit_from(
         clock.before = checkpoint.elapsed;
     }
     let prepared = Prepared::new(garment, source, target, params, &mut clock, observe)?;
-    let (cages, losses) = (&prepared.cages, &prepared.losses);
-    let (source_drape, x_star) = (&prepared.source_drape, &prepared.x_star);
-
-    // §3, §4.4, §4.6: drape, compare, step, from the best of three guesses.
     let scene = prepared.scene();
-    let search = prepared.search(&scene);
-    let found = match checkpoint {
-        Some(checkpoint) => {
-            clock.stage("search", observe);
-            if !checkpoint.is_of(params, x_star, cages.unknown_count()) {
-                return Err(RefitError::OtherCheckpoint);
-            }
-            search
-                .resume(checkpoint, &clock, observe)
-                .ok_or(RefitError::OtherCheckpoint)?
-        }
-        None => searched(&prepared, &search, &mut clock, observe)?,
-    };
+
+    // §3, §4.4, §4.6: drape, compare, step.
+    let found = searched(&prepared, checkpoint, &mut clock, observe)?;
 
     // The pattern as it will be cut: curves within the tolerance, and the drape of just that.
     clock.stage("pattern as written", observe);
@@ -229,17 +219,17 @@ pub fn refit_from(
         garment,
         source,
         target,
-        source_drape,
-        x_star,
+        source_drape: &prepared.source_drape,
+        x_star: &prepared.x_star,
         symmetry: prepared.symmetry.as_ref(),
         written: &written,
         last: &last,
-        losses,
+        losses: &prepared.losses,
     };
     let report = measured.report(
         found.status,
         prepared.scale,
-        cages.unknown_count(),
+        prepared.cages.unknown_count(),
         found.iterations,
         clock.stages,
     );
@@ -254,30 +244,109 @@ pub fn refit_from(
     })
 }
 
-/// The best pattern from three guesses: the scaled reference, a pattern flattened from the target
-/// shape, and the end of a short search in stiffer cloth.
-fn searched<S: Surface>(
+/// The best pattern, searched for in a coarse mesh of the garment first if it is fine. What the
+/// coarse search ends with is a guess; the search in the garment's own mesh decides. A checkpoint is
+/// of one or the other.
+fn searched(
     prepared: &Prepared<'_>,
-    search: &search::Search<'_, S>,
+    mut checkpoint: Option<Checkpoint>,
     clock: &mut Clock,
     observe: &mut Observer<'_>,
 ) -> Result<Found, RefitError> {
+    if let Some(own) = checkpoint.take_if(|noted| prepared.noted(noted)) {
+        clock.stage("search", observe);
+        return resumed(prepared, own, clock, observe);
+    }
+    if let Some(garment) = prepared.coarser() {
+        let coarser = prepared.on_mesh_of(&garment)?;
+        let stages = [
+            "search in stiffer cloth, coarse mesh",
+            "search, coarse mesh",
+        ];
+        let coarse = if let Some(own) = checkpoint.take_if(|noted| coarser.noted(noted)) {
+            clock.stage(stages[1], observe);
+            resumed(&coarser, own, clock, observe)
+        } else if checkpoint.is_some() {
+            Err(RefitError::OtherCheckpoint)
+        } else {
+            explored(&coarser, stages, clock, observe)
+        };
+        match coarse {
+            Ok(coarse) => return finished(prepared, coarse, clock, observe),
+            // Not in so coarse a mesh.
+            Err(RefitError::NotAtRest { .. }) => {}
+            Err(error) => return Err(error),
+        }
+    }
+    if checkpoint.is_some() {
+        return Err(RefitError::OtherCheckpoint);
+    }
+    explored(
+        prepared,
+        ["search in stiffer cloth", "search"],
+        clock,
+        observe,
+    )
+}
+
+/// The search, taken up from where a checkpoint left it.
+fn resumed(
+    prepared: &Prepared<'_>,
+    checkpoint: Checkpoint,
+    clock: &Clock,
+    observe: &mut Observer<'_>,
+) -> Result<Found, RefitError> {
+    let scene = prepared.scene();
+    let found = prepared.search(&scene).resume(checkpoint, clock, observe);
+    found.ok_or(RefitError::OtherCheckpoint)
+}
+
+/// The search in the garment's own mesh, from what the `coarse` one found. If that was interrupted,
+/// its pattern is draped and taken.
+fn finished(
+    prepared: &Prepared<'_>,
+    coarse: Found,
+    clock: &mut Clock,
+    observe: &mut Observer<'_>,
+) -> Result<Found, RefitError> {
+    clock.stage("search", observe);
+    let scene = prepared.scene();
+    let search = prepared.search(&scene);
+    let (initial, guesses) = (prepared.initial(), vec![coarse.zeta]);
+    if coarse.status != Status::Stopped {
+        return search.run(initial, guesses, clock, observe);
+    }
+    let no_further = DescentParams {
+        iterations: 0,
+        ..prepared.params.descent
+    };
+    let search = Search {
+        params: &no_further,
+        fresh_starts: 0,
+        ..search
+    };
+    let mut found = search.run(initial, guesses, clock, &mut |_| true)?;
+    found.status = Status::Stopped;
+    Ok(found)
+}
+
+/// The best pattern, from the best of three guesses.
+fn explored(
+    prepared: &Prepared<'_>,
+    [in_stiffer_cloth, in_its_own]: [&'static str; 2],
+    clock: &mut Clock,
+    observe: &mut Observer<'_>,
+) -> Result<Found, RefitError> {
+    let scene = prepared.scene();
+    let search = prepared.search(&scene);
     let initial = prepared.initial();
-    let flattened = flatten::flatten(
-        &prepared.garment.mesh,
-        &prepared.cages,
-        &prepared.motions,
-        &prepared.losses,
-        [prepared.source_drape.as_slice(), &prepared.x_star],
-        initial.clone(),
-    );
-    let mut guesses = vec![flattened];
-    if search.params.gradient == Gradient::Equilibrium {
-        clock.stage("search in stiffer cloth", observe);
-        let third = stiffen::stiffened(search, initial.clone(), guesses.clone(), clock, observe)?;
+    let mut guesses = vec![flatten::flatten(prepared)];
+    if prepared.params.descent.gradient == Gradient::Equilibrium {
+        clock.stage(in_stiffer_cloth, observe);
+        let third = stiffen::stiffened(&search, initial.clone(), guesses.clone(), clock, observe)?;
         guesses.extend(third);
     }
-    clock.stage("search", observe);
+    clock.stage(in_its_own, observe);
     search.run(initial, guesses, clock, observe)
 }
 

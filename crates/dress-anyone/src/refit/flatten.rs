@@ -7,12 +7,12 @@
 //! seam terms of the loss), R anew in every round, as in as-rigid-as-possible mapping (Sorkine &
 //! Alexa 2007). No drape is needed. Not in the paper, whose initial guess is a uniform scale.
 
+use super::prepare::Prepared;
 use super::search::guards::{can_be_cut, quality_floor, without};
 use super::search::newton::slope;
-use crate::cage::Cages;
 use crate::descent::Model;
 use crate::geometry::{Mat2, Vec2, Vec3};
-use crate::loss::{Losses, Row};
+use crate::loss::Row;
 use crate::pattern::PatternMesh;
 use crate::sim::energy::membrane::RestTriangle;
 use nalgebra::DVector;
@@ -28,16 +28,19 @@ const LEAST_QUALITY: f64 = 0.85;
 /// Damping of the fits, for what nothing determines.
 const DAMPING: f64 = 1e-4;
 
-/// Unknowns, starting from `zeta`, whose rest shape makes `x_star` as stretched as `drape` is over
-/// the reference.
-pub(super) fn flatten(
-    mesh: &PatternMesh,
-    cages: &Cages,
-    motions: &[Vec<Vec2>],
-    losses: &Losses,
-    [drape, x_star]: [&[Vec3]; 2],
-    mut zeta: Vec<f64>,
-) -> Vec<f64> {
+/// Unknowns, starting from the initial guess, whose rest shape makes x* as stretched as the source
+/// drape is over the reference.
+pub(super) fn flatten(prepared: &Prepared<'_>) -> Vec<f64> {
+    let Prepared {
+        cages,
+        motions,
+        losses,
+        x_star,
+        source_drape: drape,
+        ..
+    } = prepared;
+    let mesh = &prepared.garment.mesh;
+    let mut zeta = prepared.initial();
     let wanted: Vec<Wanted> = (0..mesh.triangles.len())
         .filter_map(|t| Wanted::new(mesh, t, drape, x_star))
         .collect();

@@ -1,6 +1,7 @@
 //! What a search works on: the target shape (paper §4.2), cages (§4.3) with their symmetry (§4.5), the
 //! initial scale (§4.6), the body to drape on and the loss (§4.4).
 
+use super::checkpoint::Checkpoint;
 use super::dress::holds;
 use super::search::{self, Search};
 use super::{Clock, Observer, RefitError, RefitParams, drape_to_rest};
@@ -11,15 +12,21 @@ use crate::descent::Gradient;
 use crate::garment::Garment;
 use crate::geometry::{Vec2, Vec3};
 use crate::loss::Losses;
+use crate::pattern::resample::resample;
 use crate::pattern::symmetry::Symmetry;
+use crate::pattern::triangulate;
 use crate::sim::{Assembly, Cloth, Scene};
 use crate::transfer::target_shape;
+use std::sync::Arc;
+
+/// A mesh of less than this many times the coarse one's vertices is searched at once.
+const WORTH_COARSENING: usize = 2;
 
 /// Everything that follows from garment, bodies and parameters, and that no search changes.
 pub(super) struct Prepared<'a> {
     pub(super) garment: &'a Garment,
     target: &'a Body,
-    params: &'a RefitParams,
+    pub(super) params: &'a RefitParams,
     /// The garment on the source body \[m\].
     pub(super) source_drape: Vec<Vec3>,
     /// The shape to aim for \[m\].
@@ -30,7 +37,7 @@ pub(super) struct Prepared<'a> {
     pub(super) scale: f64,
     cloth: Cloth,
     assembly: Assembly,
-    surface: DistanceField,
+    surface: Arc<DistanceField>,
     pub(super) losses: Losses,
     /// ∂x̄ along each unknown, `[unknown][pattern vertex]`.
     pub(super) motions: Vec<Vec<Vec2>>,
@@ -64,17 +71,35 @@ impl<'a> Prepared<'a> {
         let x_star =
             target_shape(&source_drape, &outward, source, target, &params.transfer)?.x_star;
 
-        // §4.3, §4.5: the unknowns are the control points of one cage per panel.
+        clock.stage("target body", observe);
+        let surface =
+            DistanceField::new(&target.mesh, DistanceField::SPACING, DistanceField::OUTER);
+
         clock.stage("cages", observe);
         let symmetry = params
             .symmetry
             .then(|| Symmetry::detect(&garment.pattern, mesh, garment.drape.as_deref()));
+        Self::aiming(
+            garment,
+            [source_drape, x_star],
+            symmetry,
+            (target, Arc::new(surface)),
+            params,
+        )
+    }
+
+    /// A search that aims at the second of the drapes, where the first is what the garment was.
+    fn aiming(
+        garment: &'a Garment,
+        [source_drape, x_star]: [Vec<Vec3>; 2],
+        symmetry: Option<Symmetry>,
+        (target, surface): (&'a Body, Arc<DistanceField>),
+        params: &'a RefitParams,
+    ) -> Result<Self, RefitError> {
+        let mesh = &garment.mesh;
+        // §4.3, §4.5: the unknowns are the control points of one cage per panel.
         let cages = Cages::enclose(&garment.pattern, mesh, symmetry.as_ref(), &params.cage)
             .map_err(RefitError::Garment)?;
-
-        clock.stage("target body", observe);
-        let surface =
-            DistanceField::new(&target.mesh, DistanceField::SPACING, DistanceField::OUTER);
         let mut cloth = Cloth::new(mesh, &params.fabric);
         cloth.holds = holds(garment, &x_star, &params.hold);
         Ok(Self {
@@ -94,12 +119,45 @@ impl<'a> Prepared<'a> {
         })
     }
 
+    /// The garment in a mesh of about [`RefitParams::coarse`] vertices; none if it has few more than
+    /// that itself, or cannot be meshed so coarsely, or is searched in the paper's way.
+    pub(super) fn coarser(&self) -> Option<Garment> {
+        let fine = &self.garment.mesh;
+        let (count, wanted) = (fine.cloth_vertex_count, self.params.coarse);
+        let paper = self.params.descent.gradient == Gradient::Trajectory;
+        if paper || wanted == 0 || count < WORTH_COARSENING * wanted {
+            return None;
+        }
+        let triangles = 0..fine.triangles.len();
+        let area: f64 = triangles.map(|t| fine.rest_area(t, &fine.x_bar)).sum();
+        // Equilateral triangles, two for each vertex.
+        let edge = (2.0 / 3.0_f64.sqrt() * area / wanted as f64).sqrt();
+        let mesh = triangulate::mesh(&self.garment.pattern, edge).ok()?;
+        Some(Garment {
+            name: self.garment.name.clone(),
+            pattern: self.garment.pattern.clone(),
+            drape: None,
+            mesh,
+        })
+    }
+
+    /// The same search with the mesh of `coarse`: same aim, same cages, so its unknowns are these.
+    pub(super) fn on_mesh_of<'b>(
+        &'b self,
+        coarse: &'b Garment,
+    ) -> Result<Prepared<'b>, RefitError> {
+        let fine = &self.garment.mesh;
+        let drapes = [&self.source_drape, &self.x_star].map(|x| resample(fine, x, &coarse.mesh));
+        let body = (self.target, Arc::clone(&self.surface));
+        Prepared::aiming(coarse, drapes, self.symmetry.clone(), body, self.params)
+    }
+
     /// The cloth on the target body.
     pub(super) fn scene(&self) -> Scene<'_, DistanceField> {
         Scene {
             cloth: &self.cloth,
             assembly: &self.assembly,
-            surface: &self.surface,
+            surface: &*self.surface,
             params: &self.params.sim,
         }
     }
@@ -125,6 +183,11 @@ impl<'a> Prepared<'a> {
             },
             keep: Some(self.params),
         }
+    }
+
+    /// Whether a checkpoint is of this search.
+    pub(super) fn noted(&self, checkpoint: &Checkpoint) -> bool {
+        checkpoint.is_of(self.params, &self.x_star, self.cages.unknown_count())
     }
 
     /// The unknowns of the scaled reference.
