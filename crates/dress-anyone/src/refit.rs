@@ -202,18 +202,7 @@ pub fn refit_from(
     let scene = prepared.scene();
 
     // §3, §4.4, §4.6: drape, compare, step.
-    let found = match checkpoint {
-        Some(checkpoint) => {
-            clock.stage("search", observe);
-            let unknowns = prepared.cages.unknown_count();
-            if !checkpoint.is_of(params, &prepared.x_star, unknowns) {
-                return Err(RefitError::OtherCheckpoint);
-            }
-            let found = prepared.search(&scene).resume(checkpoint, &clock, observe);
-            found.ok_or(RefitError::OtherCheckpoint)?
-        }
-        None => levels::searched(&prepared, &mut clock, observe)?,
-    };
+    let found = levels::searched(&prepared, checkpoint, &mut clock, observe)?;
 
     // The pattern as it will be cut: curves within the tolerance, and the drape of just that.
     clock.stage("pattern as written", observe);

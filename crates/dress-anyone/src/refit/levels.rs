@@ -1,32 +1,49 @@
 //! The search from coarse to fine: in a coarse mesh of the garment from three guesses, then in the
 //! garment's own mesh from what that found. Not in the paper, which has one mesh and one guess.
 
+use super::checkpoint::Checkpoint;
 use super::prepare::Prepared;
 use super::search::Search;
-use super::{Clock, Found, Observer, Progress, RefitError, flatten, stiffen};
+use super::{Clock, Found, Observer, RefitError, flatten, stiffen};
 use crate::descent::{DescentParams, Gradient};
 use crate::report::Status;
 
 /// The best pattern, searched for in a coarse mesh of the garment first if it is fine. What the
-/// coarse search ends with is a guess; the search in the garment's own mesh decides.
+/// coarse search ends with is a guess; the search in the garment's own mesh decides. A checkpoint is
+/// of one or the other.
 pub(super) fn searched(
     prepared: &Prepared<'_>,
+    mut checkpoint: Option<Checkpoint>,
     clock: &mut Clock,
     observe: &mut Observer<'_>,
 ) -> Result<Found, RefitError> {
+    if let Some(own) = checkpoint.take_if(|noted| prepared.noted(noted)) {
+        clock.stage("search", observe);
+        return resumed(prepared, own, clock, observe);
+    }
     if let Some(garment) = prepared.coarser() {
+        let coarser = prepared.on_mesh_of(&garment)?;
         let stages = [
             "search in stiffer cloth, coarse mesh",
             "search, coarse mesh",
         ];
-        // There is no going on from within it.
-        let mut unkept = |told: &Progress| matches!(told, Progress::Checkpoint(_)) || observe(told);
-        match explored(&prepared.on_mesh_of(&garment)?, stages, clock, &mut unkept) {
+        let coarse = if let Some(own) = checkpoint.take_if(|noted| coarser.noted(noted)) {
+            clock.stage(stages[1], observe);
+            resumed(&coarser, own, clock, observe)
+        } else if checkpoint.is_some() {
+            Err(RefitError::OtherCheckpoint)
+        } else {
+            explored(&coarser, stages, clock, observe)
+        };
+        match coarse {
             Ok(coarse) => return finished(prepared, coarse, clock, observe),
             // Not in so coarse a mesh.
             Err(RefitError::NotAtRest { .. }) => {}
             Err(error) => return Err(error),
         }
+    }
+    if checkpoint.is_some() {
+        return Err(RefitError::OtherCheckpoint);
     }
     explored(
         prepared,
@@ -34,6 +51,18 @@ pub(super) fn searched(
         clock,
         observe,
     )
+}
+
+/// The search, taken up from where a checkpoint left it.
+fn resumed(
+    prepared: &Prepared<'_>,
+    checkpoint: Checkpoint,
+    clock: &Clock,
+    observe: &mut Observer<'_>,
+) -> Result<Found, RefitError> {
+    let scene = prepared.scene();
+    let found = prepared.search(&scene).resume(checkpoint, clock, observe);
+    found.ok_or(RefitError::OtherCheckpoint)
 }
 
 /// The search in the garment's own mesh, from what the `coarse` one found. If that was interrupted,

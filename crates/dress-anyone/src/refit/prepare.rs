@@ -1,6 +1,7 @@
 //! What a search works on: the target shape (paper §4.2), cages (§4.3) with their symmetry (§4.5), the
 //! initial scale (§4.6), the body to drape on and the loss (§4.4).
 
+use super::checkpoint::Checkpoint;
 use super::dress::holds;
 use super::search::{self, Search};
 use super::{Clock, Observer, RefitError, RefitParams, drape_to_rest};
@@ -171,6 +172,11 @@ impl<'a> Prepared<'a> {
             },
             keep: Some(self.params),
         }
+    }
+
+    /// Whether a checkpoint is of this search.
+    pub(super) fn noted(&self, checkpoint: &Checkpoint) -> bool {
+        checkpoint.is_of(self.params, &self.x_star, self.cages.unknown_count())
     }
 
     /// The unknowns of the scaled reference.

@@ -216,7 +216,7 @@ impl<'a, S: Surface> Stepper<'a, S> {
             let w = t.map(|a| self.w[a as usize]);
             let f = rest.gradient_of(t.map(|a| x[a as usize]));
             let alpha_tilde = self.compliance / rest.area;
-            let system = alpha_tilde + constraint_mass(rest, &f, w);
+            let system = alpha_tilde + constraint_mass(&f, &rest.weighted(w));
             let lambda = &mut self.lambda_membrane[e];
             let right = -constraint(&f) - alpha_tilde * *lambda;
             let delta = solve_symmetric(&system, &right);

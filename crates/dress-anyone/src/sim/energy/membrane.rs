@@ -84,6 +84,12 @@ impl RestTriangle {
         [-b1 - b2, b1, b2]
     }
 
+    /// Σ_a w_a b_a b_aᵀ for weights `w` of the corners.
+    pub fn weighted(&self, w: [f64; 3]) -> Mat2 {
+        let [a, b, c] = self.gradients();
+        a * a.transpose() * w[0] + b * b.transpose() * w[1] + c * c.transpose() * w[2]
+    }
+
     /// Σ_a y_a b_aᵀ: the deformation gradient for positions, its variation for displacements.
     pub fn gradient_of(&self, y: [Vec3; 3]) -> Mat3x2 {
         Mat3x2::from_columns(&[y[1] - y[0], y[2] - y[0]]) * self.inverse
@@ -179,10 +185,8 @@ pub fn constraint_gradient(f: &Mat3x2, y: &Vec3) -> Mat3x2 {
     f * symmetric(y)
 }
 
-/// Σ_a w_a (∂C/∂x_a)(∂C/∂x_a)ᵀ for the weights `w` of the corners.
-pub fn constraint_mass(rest: &RestTriangle, f: &Mat3x2, w: [f64; 3]) -> Mat3 {
-    let [a, b, c] = rest.gradients();
-    let b = a * a.transpose() * w[0] + b * b.transpose() * w[1] + c * c.transpose() * w[2];
+/// Σ_a w_a (∂C/∂x_a)(∂C/∂x_a)ᵀ, given Σ_a w_a b_a b_aᵀ.
+pub fn constraint_mass(f: &Mat3x2, b: &Mat2) -> Mat3 {
     let g = f.transpose() * f;
     let uu_uv = b.m11 * g.m12 + b.m12 * g.m11;
     let vv_uv = b.m12 * g.m22 + b.m22 * g.m12;
@@ -360,7 +364,7 @@ mod tests {
             rest.gradients().map(|b| y * b)
         };
         let w = [0.3, 0.8, 0.5];
-        let mass = constraint_mass(&rest, &f, w);
+        let mass = constraint_mass(&f, &rest.weighted(w));
         for row in 0..3 {
             assert_derivative(
                 |s| constraint(&rest.gradient_of(moved(x, d, s)))[row],

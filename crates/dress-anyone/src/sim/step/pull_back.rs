@@ -107,13 +107,14 @@ impl<S: Surface> Stepper<'_, S> {
             let w = at.map(|a| self.w[a]);
             let b = rest.gradients();
             let alpha_tilde = self.compliance / rest.area;
-            let system = alpha_tilde + constraint_mass(rest, f, w);
+            let b_squared = rest.weighted(w);
+            let system = alpha_tilde + constraint_mass(f, &b_squared);
             let hats = at.map(|a| back.x_hat[a]);
             let lambda = self.lambda_membrane[e];
             self.lambda_membrane[e] -= delta;
 
             // x̂ pulled back to Δλ, and on to r.
-            let p = weighted(&hats, &b, w);
+            let p: Mat3x2 = (0..3).map(|i| hats[i] * (b[i] * w[i]).transpose()).sum();
             let fp = f.transpose() * p;
             let delta_hat = back.membrane[e] + Vec3::new(fp.m11, fp.m22, fp.m12 + fp.m21);
             let Some(r_hat) = solve_symmetric(&system, &delta_hat) else {
@@ -127,8 +128,7 @@ impl<S: Surface> Stepper<'_, S> {
             let (s_delta, s_r) = (symmetric(delta), symmetric(&r_hat));
             let against: [Vec3; 3] = std::array::from_fn(|i| hats[i] - turns * b[i]);
             let shifts: [Vec3; 3] = std::array::from_fn(|i| moves * (b[i] * w[i]));
-            let forward = weighted(&against, &b, w);
-            let f_hat = forward * s_delta - (weighted(&shifts, &b, [1.0; 3]) + f) * s_r;
+            let f_hat = (p - turns * b_squared) * s_delta - (moves * b_squared + f) * s_r;
             let mut b_hat = [Vec2::zeros(); 3];
             for i in 0..3 {
                 back.rest.w[at[i]] += against[i].dot(&(moves * b[i]));
@@ -201,6 +201,11 @@ impl<S: Surface> Stepper<'_, S> {
             } else {
                 tape.contact[(sweep - 1) * count + e]
             };
+            if after == 0.0 && before == 0.0 {
+                // Apart before and after: nothing moved, and no λ is there to answer.
+                back.contact[e] = 0.0;
+                continue;
+            }
             let delta = after - before;
             let ends = touch.point.ends.map(|a| a as usize);
             let mut delta_hat = 0.0;
@@ -256,12 +261,6 @@ impl<S: Surface> Stepper<'_, S> {
             }
         }
     }
-}
-
-/// Σ_a w_a v_a b_aᵀ.
-fn weighted(v: &[Vec3; 3], b: &[Vec2; 3], w: [f64; 3]) -> Mat3x2 {
-    let each = v.iter().zip(b).zip(w);
-    each.map(|((v, b), w)| v * (b * w).transpose()).sum()
 }
 
 impl RestHat {
