@@ -182,23 +182,40 @@ pub fn refit(
     params: &RefitParams,
     observe: &mut Observer<'_>,
 ) -> Result<Refit, RefitError> {
-    refit_from(garment, source, target, params, None, observe)
+    refit_from(garment, source, target, params, Given::default(), observe)
 }
 
-/// A [`refit`] that goes on from a checkpoint, if there is one, as if it had not been interrupted.
+/// What a refit is given besides its inputs.
+#[derive(Clone, Debug, Default)]
+pub struct Given {
+    /// The shape to aim for \[m\], `[cloth vertex]`, instead of one carried over from the source body.
+    pub x_star: Option<Vec<Vec3>>,
+    /// Where to go on from, as if it had not been interrupted.
+    pub checkpoint: Option<Checkpoint>,
+}
+
+/// A [`refit`] that is given more.
 pub fn refit_from(
     garment: &Garment,
     source: &Body,
     target: &Body,
     params: &RefitParams,
-    checkpoint: Option<Checkpoint>,
+    given: Given,
     observe: &mut Observer<'_>,
 ) -> Result<Refit, RefitError> {
     let mut clock = Clock::new();
+    let Given { x_star, checkpoint } = given;
     if let Some(checkpoint) = &checkpoint {
         clock.before = checkpoint.elapsed;
     }
-    let prepared = Prepared::new(garment, source, target, params, &mut clock, observe)?;
+    let prepared = Prepared::new(
+        garment,
+        [source, target],
+        x_star,
+        params,
+        &mut clock,
+        observe,
+    )?;
     let scene = prepared.scene();
 
     // §3, §4.4, §4.6: drape, compare, step.

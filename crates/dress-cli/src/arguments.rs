@@ -57,6 +57,10 @@ pub struct RefitArguments {
     /// Pose of the result: the source body's, or the target body's own besides
     #[arg(long, value_name = "POSE", default_value = "source")]
     pub pose: PoseChoice,
+    /// A shape to aim for, in the unit and axes of the target body: a drape of the same mesh in OBJ, as
+    /// `dress transfer` writes it [default: the source drape carried to the target body]
+    #[arg(long, value_name = "FILE")]
+    pub target_shape: Option<PathBuf>,
     /// Folder in which to note every step of the search, so that it can be resumed
     #[arg(long, value_name = "FOLDER")]
     pub checkpoint: Option<PathBuf>,

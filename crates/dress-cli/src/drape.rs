@@ -130,14 +130,14 @@ fn read(arguments: &DrapeArguments) -> Result<(Params, Loaded, Body), Failure> {
 }
 
 /// The drape of `start`, read from `file`, for a garment that must have the same mesh.
-fn same_mesh(garment: &Garment, file: &Path, start: Garment) -> Result<Vec<Vec3>, Failure> {
+pub fn same_mesh(garment: &Garment, file: &Path, start: Garment) -> Result<Vec<Vec3>, Failure> {
     let same = start.mesh.cloth_triangles() == garment.mesh.cloth_triangles();
     let bad = |text: &str| Failure::Inputs(vec![BadInput::one(file, Problem::whole(text))]);
     match start.drape {
         Some(x) if same => Ok(x),
         Some(_) => Err(bad(
-            "this is no drape of the same mesh: drape the garment from its panels once, at the same \
-             resolution, and start from the garment.obj of that",
+            "this is no drape of the same mesh: it must be one of the same garment at the same \
+             resolution, as `dress drape` and `dress transfer` write them",
         )),
         None => Err(bad(
             "this has no drape to start from: an OBJ has, a pattern has not",

@@ -3,9 +3,10 @@
 use crate::arguments::{PoseChoice, RefitArguments};
 use crate::checkpoint;
 use crate::correspond::How;
+use crate::drape::same_mesh;
 use crate::failure::Failure;
 use crate::fitting::Inputs;
-use crate::inputs::InputReport;
+use crate::inputs::{Input, InputReport};
 use crate::params::Params;
 use crate::picture::View;
 use crate::progress::{Progress, stop_on_ctrl_c};
@@ -18,10 +19,11 @@ use dress_anyone::geometry::{TriangleMesh, Vec3};
 use dress_anyone::io::output::Output;
 use dress_anyone::io::{body, garment_obj, garmentcode, obj, svg};
 use dress_anyone::refit::dress::drape_on;
-use dress_anyone::refit::{self, Refit, RefitError, accept, refit_from};
+use dress_anyone::refit::{self, Given, Refit, RefitError, accept, refit_from};
 use dress_anyone::report::Report;
 use dress_anyone::transfer::target_shape;
 use serde::Serialize;
+use std::path::Path;
 use std::sync::atomic::Ordering;
 
 /// Refits; what to say about it in the end.
@@ -37,12 +39,20 @@ pub fn run(arguments: &RefitArguments) -> Result<String, Failure> {
     let stop = stop_on_ctrl_c().context("Ctrl-C cannot be listened to")?;
     let folder = arguments.resume.as_ref().or(arguments.checkpoint.as_ref());
     let from = arguments.resume.as_deref().map(checkpoint::read);
+    let x_star = match &arguments.target_shape {
+        Some(file) => Some(shape(file, arguments, &inputs)?),
+        None => None,
+    };
+    let given = Given {
+        x_star,
+        checkpoint: from.transpose()?,
+    };
     let refitted = refit_from(
         &inputs.loaded.garment,
         &inputs.source,
         &inputs.target,
         &inputs.params.refit,
-        from.transpose()?,
+        given,
         &mut |event| {
             progress.event(event);
             if let (refit::Progress::Checkpoint(state), Some(folder)) = (event, folder)
@@ -60,6 +70,17 @@ pub fn run(arguments: &RefitArguments) -> Result<String, Failure> {
         return Ok(String::new());
     }
     Ok(summary::of(&refitted.report, &arguments.out))
+}
+
+/// The shape to aim for that `file` holds.
+fn shape(
+    file: &Path,
+    arguments: &RefitArguments,
+    inputs: &Inputs<'_>,
+) -> Result<Vec<Vec3>, Failure> {
+    let options = arguments.fitting.pair.reading.garment(&inputs.params);
+    let read = Input::File(file).garment(&options)?;
+    same_mesh(&inputs.loaded.garment, file, read.garment)
 }
 
 /// All files of a refit, in the unit and axes of the target body's.

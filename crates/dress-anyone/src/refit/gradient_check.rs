@@ -63,7 +63,7 @@ pub fn check_gradient(
     observe: &mut Observer<'_>,
 ) -> Result<GradientCheck, RefitError> {
     let mut clock = Clock::new();
-    let prepared = Prepared::new(garment, source, target, params, &mut clock, observe)?;
+    let prepared = Prepared::new(garment, [source, target], None, params, &mut clock, observe)?;
     clock.stage("drapes to compare", observe);
     let scene = prepared.scene();
     let search = prepared.search(&scene);

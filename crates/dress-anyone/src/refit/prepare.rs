@@ -46,8 +46,8 @@ pub(super) struct Prepared<'a> {
 impl<'a> Prepared<'a> {
     pub(super) fn new(
         garment: &'a Garment,
-        source: &Body,
-        target: &'a Body,
+        [source, target]: [&'a Body; 2],
+        x_star: Option<Vec<Vec3>>,
         params: &'a RefitParams,
         clock: &mut Clock,
         observe: &mut Observer<'_>,
@@ -57,8 +57,14 @@ impl<'a> Prepared<'a> {
             return Err(RefitError::Garment(problems));
         }
         let mesh = &garment.mesh;
-        let (source_drape, aim) = carried(garment, [source, target], params, clock, observe)?;
-        let x_star = aim.x_star;
+        let bodies = [source, target];
+        let (source_drape, x_star) = match x_star {
+            Some(x_star) => (on_source(garment, source, params, clock, observe)?, x_star),
+            None => {
+                let (source_drape, aim) = carried(garment, bodies, params, clock, observe)?;
+                (source_drape, aim.x_star)
+            }
+        };
 
         clock.stage("target body", observe);
         let surface =
@@ -185,8 +191,22 @@ impl<'a> Prepared<'a> {
     }
 }
 
-/// The garment on the source body — as its file has it, or from the placed panels — and the shape to
-/// aim for on the target (§4.2).
+/// The garment on the source body \[m\]: as its file has it, or from the placed panels.
+fn on_source(
+    garment: &Garment,
+    source: &Body,
+    params: &RefitParams,
+    clock: &mut Clock,
+    observe: &mut Observer<'_>,
+) -> Result<Vec<Vec3>, RefitError> {
+    clock.stage("source drape", observe);
+    match &garment.drape {
+        Some(x) => Ok(x.clone()),
+        None => drape_to_rest(garment, source, params, observe),
+    }
+}
+
+/// The garment on the source body, and the shape to aim for on the target (§4.2).
 pub(super) fn carried(
     garment: &Garment,
     [source, target]: [&Body; 2],
@@ -194,11 +214,7 @@ pub(super) fn carried(
     clock: &mut Clock,
     observe: &mut Observer<'_>,
 ) -> Result<(Vec<Vec3>, Target), RefitError> {
-    clock.stage("source drape", observe);
-    let source_drape = match &garment.drape {
-        Some(x) => x.clone(),
-        None => drape_to_rest(garment, source, params, observe)?,
-    };
+    let source_drape = on_source(garment, source, params, clock, observe)?;
     clock.stage("target shape", observe);
     let outward = garment.mesh.outward_triangles();
     let aim = target_shape(&source_drape, &outward, source, target, &params.transfer)?;
