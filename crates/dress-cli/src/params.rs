@@ -362,7 +362,7 @@ mod tests {
                 "key `fabric.drag`: there is no such key here; it belongs to [sim.step]",
                 "key `read.bananas`: there is no such key; known here: `panel_rotation`, \
                  `resolution`",
-                "key `verbosity`: there is no such key; known here: `cage`, `descent`, `fabric`, \
+                "key `verbosity`: there is no such key; known here: `cage`, `coarse`, `descent`, `fabric`, \
                  `hold`, `loss`, `outline_tolerance`, `read`, `sim`, `symmetry`, `transfer`",
             ]
         );
