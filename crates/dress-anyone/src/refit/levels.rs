@@ -3,9 +3,11 @@
 
 use super::checkpoint::Checkpoint;
 use super::prepare::Prepared;
-use super::search::Search;
+use super::search::{Guess, Search};
 use super::{Clock, Found, Observer, RefitError, flatten, stiffen};
 use crate::descent::{DescentParams, Gradient};
+use crate::geometry::intersections;
+use crate::pattern::resample::resample;
 use crate::report::Status;
 
 /// The best pattern, searched for in a coarse mesh of the garment first if it is fine. What the
@@ -36,7 +38,12 @@ pub(super) fn searched(
             explored(&coarser, stages, clock, observe)
         };
         match coarse {
-            Ok(coarse) => return finished(prepared, coarse, clock, observe),
+            Ok(coarse) => {
+                let x = resample(&garment.mesh, &coarse.x, &prepared.garment.mesh);
+                let zeta = coarse.zeta;
+                let guess = Guess { zeta, x };
+                return finished(prepared, guess, coarse.status, clock, observe);
+            }
             // Not in so coarse a mesh.
             Err(RefitError::NotAtRest { .. }) => {}
             Err(error) => return Err(error),
@@ -69,15 +76,16 @@ fn resumed(
 /// its pattern is draped and taken.
 fn finished(
     prepared: &Prepared<'_>,
-    coarse: Found,
+    coarse: Guess,
+    status: Status,
     clock: &mut Clock,
     observe: &mut Observer<'_>,
 ) -> Result<Found, RefitError> {
     clock.stage("search", observe);
     let scene = prepared.scene();
     let search = prepared.search(&scene);
-    let (initial, guesses) = (prepared.initial(), vec![coarse.zeta]);
-    if coarse.status != Status::Stopped {
+    let (initial, guesses) = (prepared.initial(), both_starts(prepared, coarse));
+    if status != Status::Stopped {
         return search.run(initial, guesses, clock, observe);
     }
     let no_further = DescentParams {
@@ -94,6 +102,21 @@ fn finished(
     Ok(found)
 }
 
+/// The guess draped from the target shape, and — if no cloth goes through itself there — from the
+/// drape it came with, which has the fewer wrinkles of a coarse mesh.
+fn both_starts(prepared: &Prepared<'_>, guess: Guess) -> Vec<Guess> {
+    let from_target = Guess {
+        zeta: guess.zeta.clone(),
+        x: prepared.x_star.clone(),
+    };
+    let triangles = prepared.garment.mesh.cloth_triangles();
+    if intersections::within(&guess.x, &triangles).is_empty() {
+        vec![from_target, guess]
+    } else {
+        vec![from_target]
+    }
+}
+
 /// The best pattern, from the best of three guesses.
 fn explored(
     prepared: &Prepared<'_>,
@@ -104,11 +127,15 @@ fn explored(
     let scene = prepared.scene();
     let search = prepared.search(&scene);
     let initial = prepared.initial();
-    let mut guesses = vec![flatten::flatten(prepared)];
+    let from_target = |zeta| Guess {
+        zeta,
+        x: prepared.x_star.clone(),
+    };
+    let mut guesses = vec![from_target(flatten::flatten(prepared))];
     if prepared.params.descent.gradient == Gradient::Equilibrium {
         clock.stage(in_stiffer_cloth, observe);
         let third = stiffen::stiffened(&search, initial.clone(), guesses.clone(), clock, observe)?;
-        guesses.extend(third);
+        guesses.extend(third.map(from_target));
     }
     clock.stage(in_its_own, observe);
     search.run(initial, guesses, clock, observe)

@@ -66,6 +66,14 @@ struct Going<'s> {
     moved: Option<f64>,
 }
 
+/// A pattern to begin from, and where its drape starts.
+#[derive(Clone, Debug)]
+pub(super) struct Guess {
+    pub(super) zeta: Vec<f64>,
+    /// \[m\].
+    pub(super) x: Vec<Vec3>,
+}
+
 /// What changes while searching.
 pub(super) struct Run<'a, 'b> {
     notes: Vec<Iteration>,
@@ -116,12 +124,12 @@ impl<'a, 'b> Run<'a, 'b> {
 }
 
 impl<'s, S: Surface> Search<'s, S> {
-    /// Searches from the best of several guesses, the initial one first. All are draped from the
-    /// target shape.
+    /// Searches from the best of several guesses, the initial one first, draped from the target
+    /// shape.
     pub(super) fn run(
         &self,
         initial: Vec<f64>,
-        others: Vec<Vec<f64>>,
+        others: Vec<Guess>,
         clock: &Clock,
         observe: &mut Observer<'_>,
     ) -> Result<Found, RefitError> {
@@ -134,11 +142,12 @@ impl<'s, S: Surface> Search<'s, S> {
             if !run.go_on {
                 break;
             }
-            let tried = self.candidate(guess, self.x_star.to_vec(), &mut run);
+            let tried = self.candidate(guess.zeta, guess.x, &mut run);
             if let Some(better) = tried.ok().filter(|tried| tried.total < best.total) {
                 let better = self.accept(better);
                 let far = farthest(&better.x_bar, &best.x_bar);
-                moved = Some(far);
+                // The same pattern from another start says nothing of how far there is to go.
+                moved = Some(far).filter(|far| *far > 0.0);
                 best = better;
                 self.note(&best, far, &mut run);
             }

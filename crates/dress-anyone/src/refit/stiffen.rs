@@ -4,7 +4,7 @@
 //! bends over a hand's breadth instead of a finger's hangs in few ways: its search is short and
 //! smooth, and ends near where the soft cloth's should. Not in the paper.
 
-use super::search::Search;
+use super::search::{Guess, Search};
 use super::{Clock, Found, Observer, RefitError};
 use crate::descent::DescentParams;
 use crate::sim::energy::contact::Surface;
@@ -23,7 +23,7 @@ const TOLERANCE: f64 = 2e-2;
 pub(super) fn stiffened<S: Surface>(
     search: &Search<'_, S>,
     initial: Vec<f64>,
-    others: Vec<Vec<f64>>,
+    others: Vec<Guess>,
     clock: &Clock,
     observe: &mut Observer<'_>,
 ) -> Result<Option<Vec<f64>>, RefitError> {
