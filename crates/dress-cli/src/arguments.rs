@@ -352,7 +352,7 @@ mod tests {
         assert_eq!(params.read.panel_rotation, RotationOrder::Intrinsic);
         assert_eq!(params.refit.cage.kind, CageKind::Green);
         assert!(!params.refit.symmetry);
-        let body = refit.fitting.reading.body();
+        let body = refit.fitting.pair.reading.body();
         assert_eq!(body.metres_per_unit, Some(0.0254));
         assert_eq!(body.up, Some(UpAxis::Z));
     }

@@ -132,6 +132,7 @@ mod tests {
         };
         let options = refit
             .fitting
+            .pair
             .reading
             .garment(&refit.fitting.params().expect("defaults"));
         let garment = TSHIRT.garment(&options).expect("a good garment").garment;
@@ -141,7 +142,7 @@ mod tests {
         );
         let body = |input: Input<'_>| {
             input
-                .body(&refit.fitting.reading.body())
+                .body(&refit.fitting.pair.reading.body())
                 .expect("a good body")
         };
         assert!(body(AVERAGE).shares_topology(&body(HEAVY)));

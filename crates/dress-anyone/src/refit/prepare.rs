@@ -58,12 +58,11 @@ impl<'a> Prepared<'a> {
         }
         let mesh = &garment.mesh;
         let bodies = [source, target];
-        let (source_drape, x_star) = match x_star {
-            Some(x_star) => (on_source(garment, source, params, clock, observe)?, x_star),
-            None => {
-                let (source_drape, aim) = carried(garment, bodies, params, clock, observe)?;
-                (source_drape, aim.x_star)
-            }
+        let (source_drape, x_star) = if let Some(x_star) = x_star {
+            (on_source(garment, source, params, clock, observe)?, x_star)
+        } else {
+            let (source_drape, aim) = carried(garment, bodies, params, clock, observe)?;
+            (source_drape, aim.x_star)
         };
 
         clock.stage("target body", observe);

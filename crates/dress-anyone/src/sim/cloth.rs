@@ -217,6 +217,16 @@ pub(crate) mod fixtures {
 
     use super::*;
 
+    /// Unlike along warp and weft, and softer than most: small forces show.
+    pub(crate) const SOFT: Fabric = Fabric {
+        warp: 50.0,
+        weft: 80.0,
+        poisson: 0.2,
+        shear: 20.0,
+        bending: 1e-4,
+        density: 0.2,
+    };
+
     /// A rectangular panel of staggered triangles, `columns` × `rows` cells of side `h` \[m\].
     pub(crate) fn sheet(columns: usize, rows: usize, h: f64) -> PatternMesh {
         let mut x_bar = Vec::new();

@@ -1,19 +1,11 @@
 use super::*;
 use crate::check::{assert_derivative, noise};
 use crate::garment::Fabric;
-use crate::sim::cloth::{Hold, fixtures};
+use crate::sim::cloth::Hold;
+use crate::sim::cloth::fixtures::{self, SOFT};
 use crate::sim::energy::contact::Nothing;
 use crate::sim::energy::contact::fixtures::{Cone, Floor};
 use approx::assert_relative_eq;
-
-const SOFT: Fabric = Fabric {
-    warp: 50.0,
-    weft: 80.0,
-    poisson: 0.2,
-    shear: 20.0,
-    bending: 1e-4,
-    density: 0.2,
-};
 
 /// A tube of circumference 0.6 m meets 0.6 m and more on it: held by the slope alone.
 const TIGHT: Cone = Cone {

@@ -3,18 +3,10 @@ use crate::check::{assert_derivative, noise};
 use crate::garment::Fabric;
 use crate::pattern::PatternMesh;
 use crate::sim::Assembly;
-use crate::sim::cloth::{Hold, fixtures};
+use crate::sim::cloth::Hold;
+use crate::sim::cloth::fixtures::{self, SOFT};
 use crate::sim::energy::contact::fixtures::Cone;
 use crate::sim::energy::contact::{ContactParams, Nothing};
-
-const SOFT: Fabric = Fabric {
-    warp: 50.0,
-    weft: 80.0,
-    poisson: 0.2,
-    shear: 20.0,
-    bending: 1e-4,
-    density: 0.2,
-};
 
 /// Derivative by the rest shape of a fixed linear function of the end, against two more trajectories.
 fn check<S: Surface>(cloth: &Cloth, surface: &S, mesh: &PatternMesh, x: &[Vec3], steps: usize) {

@@ -2,21 +2,13 @@ use super::*;
 use crate::check::{assert_derivative, noise};
 use crate::garment::Fabric;
 use crate::pattern::PatternMesh;
-use crate::sim::cloth::{Hold, fixtures};
+use crate::sim::cloth::Hold;
+use crate::sim::cloth::fixtures::{self, SOFT};
 use crate::sim::energy::contact::fixtures::Cone;
 use crate::sim::energy::contact::{ContactParams, Nothing};
 use crate::sim::energy::layers::LayerParams;
 use crate::sim::layers::Watch;
 use crate::sim::step::StepParams;
-
-const SOFT: Fabric = Fabric {
-    warp: 50.0,
-    weft: 80.0,
-    poisson: 0.2,
-    shear: 20.0,
-    bending: 1e-4,
-    density: 0.2,
-};
 
 const CONE: Cone = Cone {
     radius: 0.12,
