@@ -4,8 +4,11 @@
 use crate::geometry::{Mat3, Vec3};
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt::factor::LltRegularization;
+use faer::perm::PermRef;
+use faer::sparse::linalg::amd;
 use faer::sparse::linalg::cholesky::{
-    LltRef, SymbolicCholesky, SymmetricOrdering, factorize_symbolic_cholesky,
+    CholeskySymbolicParams, LltRef, SymbolicCholesky, SymmetricOrdering,
+    factorize_symbolic_cholesky,
 };
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use faer::{Conj, MatMut, Par, Side};
@@ -76,11 +79,12 @@ impl Structure {
         let n = 3 * vertex_count;
         let pattern =
             SymbolicSparseColMatRef::new_checked(n, n, &column_starts, None, &row_indices);
+        let (order, inverse) = elimination_order(vertex_count, &starts, &rows);
         let symbolic = factorize_symbolic_cholesky(
             pattern,
             Side::Lower,
-            SymmetricOrdering::Amd,
-            faer::sparse::linalg::cholesky::CholeskySymbolicParams::default(),
+            SymmetricOrdering::Custom(PermRef::new_checked(&order, &inverse, n)),
+            CholeskySymbolicParams::default(),
         )
         .expect("the structure of a mesh fits into memory");
         Self {
@@ -117,6 +121,29 @@ impl Structure {
     pub fn factor_size(&self) -> usize {
         self.symbolic.len_val()
     }
+}
+
+/// Approximate minimum degree on the blocks: the three unknowns of a vertex follow each other, and a
+/// graph of a third of the nodes and a ninth of the edges is ordered in less than half the time.
+/// Old index of each new one, and the reverse.
+fn elimination_order(count: usize, starts: &[usize], rows: &[u32]) -> (Vec<usize>, Vec<usize>) {
+    let rows: Vec<usize> = rows.iter().map(|row| *row as usize).collect();
+    let graph = SymbolicSparseColMatRef::new_checked(count, count, starts, None, &rows);
+    let (mut order, mut inverse) = (vec![0; count], vec![0; count]);
+    let scratch = amd::order_scratch::<usize>(count, rows.len());
+    amd::order(
+        &mut order,
+        &mut inverse,
+        graph,
+        amd::Control::default(),
+        MemStack::new(&mut MemBuffer::new(scratch)),
+    )
+    .expect("the structure of a mesh fits into memory");
+    let threefold = |order: Vec<usize>| {
+        let blocks = order.into_iter();
+        blocks.flat_map(|v| [3 * v, 3 * v + 1, 3 * v + 2]).collect()
+    };
+    (threefold(order), threefold(inverse))
 }
 
 /// A symmetric matrix of 3×3 blocks.
