@@ -3,7 +3,7 @@
 pub mod fabrics;
 mod summary;
 
-use crate::geometry::Vec3;
+use crate::geometry::{Vec2, Vec3};
 use crate::pattern::{Pattern, PatternMesh};
 use serde::{Deserialize, Serialize};
 pub use summary::Summary;
@@ -26,13 +26,24 @@ impl Garment {
     /// Cloth positions of the flat panels as placed around the body \[m\]; sewn vertices take the
     /// mean of their copies.
     pub fn placed(&self) -> Vec<Vec3> {
+        self.moved(&mut |p| p).0
+    }
+
+    /// The cloth with its panels placed and every point moved by `motion`, sewn \[m\]; and the rest
+    /// shape that would lie so but for what leaves the panels' planes.
+    pub fn moved(&self, motion: &mut dyn FnMut(Vec3) -> Vec3) -> (Vec<Vec3>, Vec<Vec2>) {
         let mut placed = vec![Vec3::zeros(); self.mesh.x_bar.len()];
+        let mut flat = self.mesh.x_bar.clone();
         for (panel, range) in self.pattern.panels.iter().zip(&self.mesh.panel_vertices) {
             for v in range.clone() {
-                placed[v] = panel.placement.place(self.mesh.x_bar[v]);
+                let p = panel.placement.place(self.mesh.x_bar[v]);
+                placed[v] = motion(p);
+                if placed[v] != p {
+                    flat[v] = panel.placement.flatten(placed[v]);
+                }
             }
         }
-        self.mesh.sew(&placed)
+        (self.mesh.sew(&placed), flat)
     }
 }
 

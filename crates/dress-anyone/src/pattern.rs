@@ -92,6 +92,11 @@ impl Placement {
     pub fn place(&self, p: Vec2) -> Vec3 {
         self.rotation * Vec3::new(p.x, p.y, 0.0) + self.translation
     }
+
+    /// The point of the panel's plane below `p` \[m\].
+    pub fn flatten(&self, p: Vec3) -> Vec2 {
+        (self.rotation.transpose() * (p - self.translation)).xy()
+    }
 }
 
 impl Panel {

@@ -3,7 +3,7 @@
 use crate::body::Body;
 use crate::body::distance_field::DistanceField;
 use crate::garment::{Fabric, Garment};
-use crate::geometry::Vec3;
+use crate::geometry::{Vec2, Vec3};
 use crate::sim::drape::DrapeProgress;
 use crate::sim::{Assembly, Cloth, Drape, Hold, Scene, SimParams, Start, drape};
 use serde::{Deserialize, Serialize};
@@ -83,7 +83,10 @@ pub fn drape_on(
     let surface = DistanceField::new(&body.mesh, DistanceField::SPACING, DistanceField::OUTER);
     let (x, start) = match &garment.drape {
         Some(x) => (x.clone(), Start::Near),
-        None => (above_the_feet(garment.placed(), body), Start::Placed),
+        None => {
+            let (x, short) = above_the_feet(garment, body.mesh.bounds());
+            (x, Start::Placed { short })
+        }
     };
     let mut cloth = Cloth::new(&garment.mesh, fabric);
     cloth.holds = holds(garment, &x, hold);
@@ -98,42 +101,78 @@ pub fn drape_on(
 
 /// Height of the instep, as a part of the body's: cloth starts above it.
 const INSTEP: f64 = 0.05;
-/// Height below which cloth is squeezed together for that, likewise.
-const SHIN: f64 = 0.15;
+/// Height below which cloth starts shortened for that, likewise.
+const KNEE: f64 = 0.3;
 
-/// Squeezes together what would start about the feet or below the soles, where it would be caught,
-/// into the space between instep and shin; it falls from there.
-fn above_the_feet(mut x: Vec<Vec3>, body: &Body) -> Vec<Vec3> {
-    let (floor, top) = body.mesh.bounds();
+/// The placed panels \[m\], and their rest shape: what would start about the feet or below the soles,
+/// where it would be caught, is shortened into the space between instep and knee.
+fn above_the_feet(garment: &Garment, (floor, top): (Vec3, Vec3)) -> (Vec<Vec3>, Vec<Vec2>) {
     let at = |part: f64| floor.y + part * (top.y - floor.y);
-    let (instep, shin) = (at(INSTEP), at(SHIN));
-    let lowest = x.iter().map(|p| p.y).fold(f64::INFINITY, f64::min);
-    if lowest < instep {
-        let squeeze = (shin - instep) / (shin - lowest);
-        for p in x.iter_mut().filter(|p| p.y < shin) {
-            p.y = shin - squeeze * (shin - p.y);
-        }
+    let (instep, knee) = (at(INSTEP), at(KNEE));
+    let mut lowest = f64::INFINITY;
+    let placed = garment.moved(&mut |p| {
+        lowest = lowest.min(p.y);
+        p
+    });
+    if lowest >= instep {
+        return placed;
     }
-    x
+    let shorter = (knee - instep) / (knee - lowest);
+    garment.moved(&mut |p| {
+        let y = if p.y < knee {
+            knee - shorter * (knee - p.y)
+        } else {
+            p.y
+        };
+        Vec3::new(p.x, y, p.z)
+    })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::loss::fixtures::two_panels;
+    use approx::assert_relative_eq;
+
+    /// Two panels, 0.4 m high; their lower side is edge 0, their upper side edge 2.
+    fn tube() -> Garment {
+        let (pattern, mesh) = two_panels();
+        Garment {
+            name: "tube".to_owned(),
+            pattern,
+            mesh,
+            drape: None,
+        }
+    }
+
+    #[test]
+    fn what_starts_below_the_soles_is_shortened_to_above_the_feet() {
+        // Of a body of 1.2 m that stands at 0.1 m the instep is at 0.16 m, the knee at 0.46 m.
+        let body = (Vec3::new(0.0, 0.1, 0.0), Vec3::new(0.0, 1.3, 0.0));
+        let garment = tube();
+        let (x, short) = above_the_feet(&garment, body);
+        let lowest = x.iter().map(|p| p.y).fold(f64::INFINITY, f64::min);
+        assert_relative_eq!(lowest, 0.16, epsilon = 1e-12);
+        // All of it is below the knee: 0.3 m where there were 0.46 m.
+        for (rest, short) in garment.mesh.x_bar.iter().zip(&short) {
+            assert_relative_eq!(short.x, rest.x, epsilon = 1e-12);
+            assert_relative_eq!(
+                0.46 - short.y,
+                (0.46 - rest.y) * 0.3 / 0.46,
+                epsilon = 1e-12
+            );
+        }
+        // A body that stands lower leaves it as it is.
+        let low = (Vec3::new(0.0, -0.1, 0.0), Vec3::new(0.0, 1.1, 0.0));
+        let as_placed = (garment.placed(), garment.mesh.x_bar.clone());
+        assert_eq!(above_the_feet(&garment, low), as_placed);
+    }
 
     #[test]
     fn a_waist_is_held_unless_something_reaches_far_above_it() {
-        // Two panels, 0.4 m high; their lower side is edge 0, their upper side edge 2.
         let held = |edge: usize| {
-            let (mut pattern, mesh) = two_panels();
-            pattern.panels[0].edges[edge].label = Some("lower_interface".to_owned());
-            let garment = Garment {
-                name: "tube".to_owned(),
-                pattern,
-                mesh,
-                drape: None,
-            };
+            let mut garment = tube();
+            garment.pattern.panels[0].edges[edge].label = Some("lower_interface".to_owned());
             let held = holds(&garment, &garment.placed(), &HoldParams::default()).len();
             (held, garment.mesh.edge_vertices[0][edge].len())
         };

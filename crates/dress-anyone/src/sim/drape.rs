@@ -41,10 +41,14 @@ pub struct SimParams {
 }
 
 /// Where a drape starts.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum Start {
     /// Far away: panels placed around the body, seams open. XPBD first.
-    Placed,
+    Placed {
+        /// The rest shape to begin with \[m\], `[pattern vertex]`: panels too long for the place
+        /// they start in are cut short there, and grow while they come together.
+        short: Vec<Vec2>,
+    },
     /// Near: a drape of a similar pattern, or the target shape. Static solve at once.
     Near,
 }
@@ -108,11 +112,17 @@ pub fn drape<S: Surface>(
 ) -> Drape {
     let rest = scene.cloth.at_rest(x_bar);
     let params = scene.params;
-    let stepped = start == Start::Placed || params.solver == Solver::Xpbd;
-    let (x, sigma) = if stepped {
-        (gather(scene, &rest, x, observe), params.equilibrium.cold)
-    } else {
-        (x, params.equilibrium.warm)
+    let begun_as = match start {
+        Start::Placed { short } => Some(short),
+        Start::Near if params.solver == Solver::Xpbd => Some(x_bar.to_vec()),
+        Start::Near => None,
+    };
+    let (x, sigma) = match begun_as {
+        Some(short) => (
+            gather(scene, &growth(scene.cloth, &short, x_bar), x, observe),
+            params.equilibrium.cold,
+        ),
+        None => (x, params.equilibrium.warm),
     };
     let search = EquilibriumParams {
         iterations: match params.solver {
@@ -161,18 +171,34 @@ fn system<'a, S>(scene: &Scene<'a, S>, rest: &'a Rest) -> System<'a, S> {
 
 /// Part of the gathering time over which the inflation fades \[–\].
 const INFLATED: f64 = 0.7;
+/// Part of the gathering time after which panels that began short grow, and at which they are grown:
+/// seams are closed by then, and the cloth hangs \[–\].
+const GROWING: [f64; 2] = [0.3, 0.8];
+/// Rest shapes on the way.
+const STAGES: usize = 16;
 
-/// XPBD from rest at `x` for the configured time.
+/// The rest from `short` to `x_bar` in stages; one stage if there is nothing to grow.
+fn growth(cloth: &Cloth, short: &[Vec2], x_bar: &[Vec2]) -> Vec<Rest> {
+    let stages = if short == x_bar { 0 } else { STAGES };
+    let grown = |stage: usize| {
+        let part = (STAGES - stage) as f64 / STAGES as f64;
+        let between = short.iter().zip(x_bar).map(|(s, x)| x + (s - x) * part);
+        cloth.at_rest(&between.collect::<Vec<_>>())
+    };
+    (STAGES - stages..=STAGES).map(grown).collect()
+}
+
+/// XPBD from rest at `x` for the configured time, through the stages of `growth`.
 fn gather<S: Surface>(
     scene: &Scene<'_, S>,
-    rest: &Rest,
+    growth: &[Rest],
     x: Vec<Vec3>,
     observe: &mut dyn FnMut(DrapeProgress) -> bool,
 ) -> Vec<Vec3> {
     let step_params = scene.params.step;
     let mut stepper = Stepper::new(
         scene.cloth,
-        rest,
+        &growth[0],
         scene.surface,
         scene.params.contact,
         step_params,
@@ -186,7 +212,10 @@ fn gather<S: Surface>(
         if enough || !observe(DrapeProgress::Gathering { step, steps }) {
             break;
         }
-        let left = 1.0 - step as f64 / (INFLATED * steps as f64);
+        let now = step as f64 / steps as f64;
+        let grown = ((now - GROWING[0]) / (GROWING[1] - GROWING[0])).clamp(0.0, 1.0);
+        stepper.grow(&growth[(grown * (growth.len() - 1) as f64) as usize]);
+        let left = 1.0 - now / INFLATED;
         stepper.step(&mut state, step_params.inflation * left.max(0.0));
     }
     state.x

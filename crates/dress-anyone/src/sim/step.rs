@@ -129,7 +129,7 @@ impl<'a, S: Surface> Stepper<'a, S> {
     ) -> Self {
         Self {
             compliance: inverse(&cloth.elasticity) / (params.dt * params.dt),
-            w: rest.mass.iter().map(|m| 1.0 / m).collect(),
+            w: inverse_masses(rest),
             lambda_membrane: vec![Vec3::zeros(); cloth.triangles.len()],
             lambda_bend: vec![Vec3::zeros(); cloth.hinges.len()],
             lambda_hold: vec![0.0; cloth.holds.len()],
@@ -140,6 +140,12 @@ impl<'a, S: Surface> Stepper<'a, S> {
             params,
             watch,
         }
+    }
+
+    /// Goes on with another rest shape of the same cloth.
+    pub fn grow(&mut self, rest: &'a Rest) {
+        self.w = inverse_masses(rest);
+        self.rest = rest;
     }
 
     /// Whether layers still went through each other when last looked at.
@@ -341,6 +347,11 @@ impl Tape {
         self.holds.clear();
         self.contact.clear();
     }
+}
+
+/// 1/m \[1/kg\], `[cloth vertex]`.
+fn inverse_masses(rest: &Rest) -> Vec<f64> {
+    rest.mass.iter().map(|m| 1.0 / m).collect()
 }
 
 /// 𝔻⁻¹ \[m/N\].

@@ -118,7 +118,9 @@ fn the_gradient_of_the_whole_loss_by_the_cages_agrees_with_complete_drapes() {
         &scene,
         &mesh.x_bar,
         garment.placed(),
-        Start::Placed,
+        Start::Placed {
+            short: mesh.x_bar.clone(),
+        },
         &mut |_| true,
     );
 
