@@ -9,7 +9,9 @@
 //! | loop | flops | bytes |
 //! |---|---|---|
 //! | yardstick | 75 and 3 roots a triangle | 160 a triangle |
-//! | `sweep` | 500 a triangle: 400 for its membrane, 70 for each of its 1.5 hinges | 270 and 1.5 × 330 |
+//! | `step` of one sweep | `sweep`, contact with the body and of layers, searched now and then | |
+//! | `sweep` | 260 a triangle: 170 for its membrane, 60 for each of its 1.5 hinges | 310 and 1.5 × 310 |
+//! | `pairs` | a search for layers that may touch, 2 mm apart, with moves of 2 mm | |
 //! | `stiffness` | 900 a triangle, 40 a hinge | 9 blocks of 72 a triangle, written |
 //! | `factor` | Σ l² over the columns of L, l their lengths; about n^1.5 | 8 a non-zero of L, at least |
 //! | `closest_point` | 60 a triangle visited, 30 a box | 72 and 48; what is visited depends on the point |
@@ -28,8 +30,10 @@ use criterion::{Criterion, SamplingMode};
 use dress_anyone::body::DistanceField;
 use dress_anyone::cage::{CageParams, Cages};
 use dress_anyone::geometry::ClosestPoint;
+use dress_anyone::sim::energy::contact::Nothing;
+use dress_anyone::sim::energy::layers::LayerParams;
 use dress_anyone::sim::equilibrium::EquilibriumParams;
-use dress_anyone::sim::layers::Watch;
+use dress_anyone::sim::layers::{Layers, Watch};
 use dress_anyone::sim::step::{State, StepParams, Stepper};
 use dress_anyone::sim::system::System;
 use dress_anyone::sim::{Assembly, Scene, SimParams, Start, drape};
@@ -39,7 +43,9 @@ use std::time::Duration;
 use tube::Tube;
 
 /// Cloth vertices aimed for.
-const SIZES: [usize; 3] = [1_000, 4_000, 16_000];
+const SIZES: [usize; 3] = [1_000, 4_000, 10_000];
+/// Sweeps in the step that measures them: the rest of the step then hardly counts.
+const SWEEPS: usize = 64;
 /// Force residual at which the tube's drape ends [–].
 const NEARLY_AT_REST: f64 = 1e-3;
 
@@ -110,7 +116,35 @@ fn of_size(criterion: &mut Criterion, size: usize) -> Vec<summary::Row> {
         x: at_rest.clone(),
         v: vec![nalgebra::zero(); vertices],
     };
-    group.bench_function("sweep", |b| b.iter(|| stepper.step(&mut state, 0.0)));
+    group.bench_function("step", |b| b.iter(|| stepper.step(&mut state, 0.0)));
+    let many_sweeps = StepParams {
+        sweeps: SWEEPS,
+        ..params.step
+    };
+    let alone = LayerParams {
+        on: false,
+        ..params.layers
+    };
+    let watch = Watch::new(&cloth, alone, &at_rest);
+    let mut stepper = Stepper::new(&cloth, &rest, &Nothing, params.contact, many_sweeps, watch);
+    state.x.clone_from(&at_rest);
+    group.bench_function("sweep", |b| {
+        b.iter(|| {
+            state.x.clone_from(&at_rest);
+            stepper.step(&mut state, 0.0);
+        });
+    });
+    let mut layers = Layers::new(&cloth, params.layers, &at_rest);
+    // Every other vertex moves, so that no search serves for the next.
+    let moves: Vec<_> = (0..vertices)
+        .map(|v| nalgebra::Vector3::new(0.0, 0.0, if v % 2 == 0 { 2e-3 } else { 0.0 }))
+        .collect();
+    group.bench_function("pairs", |b| {
+        b.iter(|| {
+            layers.find_tangles(&at_rest);
+            layers.pairs(&at_rest, &moves, 0.0)
+        });
+    });
 
     let system = System {
         cloth: &cloth,
@@ -158,7 +192,9 @@ fn of_size(criterion: &mut Criterion, size: usize) -> Vec<summary::Row> {
     };
     let triangles = cloth.triangles.len();
     let rows = [
-        ("sweep", triangles, "triangle"),
+        ("step", triangles, "triangle"),
+        ("sweep", SWEEPS * triangles, "triangle"),
+        ("pairs", triangles, "triangle"),
         ("stiffness", triangles, "triangle"),
         ("factor", vertices, "vertex"),
         ("closest_point", vertices, "point"),

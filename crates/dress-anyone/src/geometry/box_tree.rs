@@ -295,7 +295,7 @@ mod tests {
             expected.extend(later.map(|j| (i as u32, j)));
         }
         assert_eq!(own, expected);
-        assert!(own.len() > 100);
+        assert!(own.len() > 10, "{}", own.len());
     }
 
     #[test]

@@ -2,6 +2,7 @@ use super::*;
 use crate::check::noise;
 use crate::garment::Fabric;
 use crate::sim::cloth::fixtures;
+use std::collections::BTreeSet;
 
 const PARAMS: LayerParams = LayerParams {
     on: true,
@@ -80,12 +81,14 @@ fn pairs_found_with_room_are_those_of_a_search() {
         let own = without_mean(&d);
         served += usize::from(layers.near.serves(&x, &own, 0.0));
         let key = |p: &Pair| (p.vertices, p.kind == Kind::PointTriangle);
-        let mut found: Vec<_> = layers.pairs(&x, &d, 0.0).iter().map(key).collect();
+        let found = layers.pairs(&x, &d, 0.0);
+        let come_close = |p: &Pair| comes_within(p, &x, &own, PARAMS.thickness);
+        assert!(found.iter().all(come_close));
+        let found: BTreeSet<_> = found.iter().map(key).collect();
         let searched = layers.search(&x, &own, PARAMS.thickness);
-        let mut expected: Vec<_> = searched.iter().map(key).collect();
-        found.sort_unstable();
-        expected.sort_unstable();
-        assert_eq!(found, expected);
+        // The search also looks at boxes, so it may be content with fewer.
+        let missed = searched.iter().filter(|p| !found.contains(&key(p)));
+        assert_eq!(missed.count(), 0);
         counted += found.len();
         for (x, d) in x.iter_mut().zip(&d) {
             *x += d;
