@@ -89,22 +89,52 @@ impl DistanceField {
 
     /// Distance and gradient at `p`; none farther outside than the band.
     pub fn sample(&self, p: Vec3) -> Option<Sample> {
-        self.sample_with_hessian(p).map(|(sample, _)| sample)
+        let (c, [x, y, z]) = self.stencil(p)?;
+        let [x, y, z] = [x, y, z].map(|t| [values(t), slopes(t)]);
+        let mut sums = [0.0; 4];
+        for k in 0..4 {
+            for j in 0..4 {
+                let (row, slope) = (dot(&x[0], &c[k][j]), dot(&x[1], &c[k][j]));
+                let (yz, by_y, by_z) = (y[0][j] * z[0][k], y[1][j] * z[0][k], y[0][j] * z[1][k]);
+                sums[0] += yz * row;
+                sums[1] += yz * slope;
+                sums[2] += by_y * row;
+                sums[3] += by_z * row;
+            }
+        }
+        let [distance, gx, gy, gz] = sums;
+        Some(Sample {
+            distance,
+            gradient: Vec3::new(gx, gy, gz) / self.grid.spacing,
+        })
+    }
+
+    /// The same where the distance is below `limit` \[m\]; told from one node where that is far off.
+    pub fn sample_below(&self, p: Vec3, limit: f64) -> Option<Sample> {
+        let u = (p - self.grid.origin) / self.grid.spacing;
+        // What is no number, or below zero, becomes node 0, whose sample decides.
+        let place = self.place([0, 1, 2].map(|axis| (u[axis] + 0.5) as usize))?;
+        if self.values[place] - DROP * self.grid.spacing > limit {
+            return None;
+        }
+        self.sample(p).filter(|s| s.distance < limit)
     }
 
     /// Distance, gradient and Hessian \[1/m\] at `p`; none farther outside than the band.
     pub fn sample_with_hessian(&self, p: Vec3) -> Option<(Sample, Mat3)> {
-        let (coefficients, [x, y, z]) = self.stencil(p)?;
+        let (c, [x, y, z]) = self.stencil(p)?;
+        let [x, y, z] = [x, y, z].map(|t| [values(t), slopes(t), bends(t)]);
         let mut distance = 0.0;
         let mut gradient = Vec3::zeros();
         let mut hessian = Mat3::zeros();
         for k in 0..4 {
             for j in 0..4 {
                 // The row along x: value, first and second derivative.
-                let row = [0, 1, 2].map(|order| {
-                    let products = x[order].iter().zip(&coefficients[k][j]);
-                    products.map(|(weight, value)| weight * value).sum::<f64>()
-                });
+                let row = [
+                    dot(&x[0], &c[k][j]),
+                    dot(&x[1], &c[k][j]),
+                    dot(&x[2], &c[k][j]),
+                ];
                 distance += y[0][j] * z[0][k] * row[0];
                 gradient.x += y[0][j] * z[0][k] * row[1];
                 gradient.y += y[1][j] * z[0][k] * row[0];
@@ -131,8 +161,8 @@ impl DistanceField {
         size_of_val(self.values.as_slice()) + size_of_val(self.starts.as_slice())
     }
 
-    /// The coefficients around `p` and the basis along x, y and z.
-    fn stencil(&self, p: Vec3) -> Option<(Coefficients, [Basis; 3])> {
+    /// The coefficients around `p`, and where `p` lies between the second and third along x, y and z.
+    fn stencil(&self, p: Vec3) -> Option<(Coefficients, [f64; 3])> {
         let u = (p - self.grid.origin) / self.grid.spacing;
         let mut first = [0; 3];
         for axis in 0..3 {
@@ -146,7 +176,12 @@ impl DistanceField {
         // Along each axis the four nodes lie in one brick or in two neighbours.
         let mut starts = [0; 8];
         for (corner, start) in starts.iter_mut().enumerate() {
-            let brick = [0, 1, 2].map(|axis| (first[axis] + 3 * (corner >> axis & 1)) / SIDE);
+            let [x, y, z] = first;
+            let brick = [
+                (x + 3 * (corner & 1)) / SIDE,
+                (y + 3 * (corner >> 1 & 1)) / SIDE,
+                (z + 3 * (corner >> 2)) / SIDE,
+            ];
             *start = self.starts[self.grid.brick_index(brick)];
             if *start == ABSENT {
                 return None;
@@ -156,14 +191,15 @@ impl DistanceField {
         let second = |axis: usize, i: usize| (first[axis] + i) / SIDE - first[axis] / SIDE;
         for k in 0..4 {
             for j in 0..4 {
+                let row = second(1, j) << 1 | second(2, k) << 2;
+                let at = (first[2] + k) % SIDE * SIDE + (first[1] + j) % SIDE;
                 for i in 0..4 {
-                    let corner = second(0, i) | second(1, j) << 1 | second(2, k) << 2;
-                    let node = node_in_brick([first[0] + i, first[1] + j, first[2] + k]);
-                    coefficients[k][j][i] = self.values[starts[corner] as usize + node];
+                    let start = starts[row | second(0, i)] as usize;
+                    coefficients[k][j][i] = self.values[start + at * SIDE + (first[0] + i) % SIDE];
                 }
             }
         }
-        Some((coefficients, [0, 1, 2].map(|axis| basis(u[axis].fract()))))
+        Some((coefficients, [u.x.fract(), u.y.fract(), u.z.fract()]))
     }
 
     /// Makes negative what is not joined to the absent bricks through positive nodes.
@@ -295,27 +331,48 @@ fn node_in_brick(node: [usize; 3]) -> usize {
 /// Values of 4³ neighbouring nodes, `[z][y][x]`.
 type Coefficients = [[[f64; 4]; 4]; 4];
 
-/// Weights of four neighbouring nodes, `[order of the derivative][node]`.
-type Basis = [[f64; 4]; 3];
+/// By how much the field falls below its value at the nearest node at most, in spacings: distances
+/// differ by no more than their places, p is √¾ from that node, and the spline's weights spread by
+/// another √(1/3) along each axis: √(¾ + 1).
+const DROP: f64 = 1.33;
 
-/// The uniform cubic B-spline between the second and third of four nodes, at `t` in 0..1.
-fn basis(t: f64) -> Basis {
+fn dot(weights: &[f64; 4], values: &[f64; 4]) -> f64 {
+    let products: [f64; 4] = [
+        weights[0] * values[0],
+        weights[1] * values[1],
+        weights[2] * values[2],
+        weights[3] * values[3],
+    ];
+    (products[0] + products[1]) + (products[2] + products[3])
+}
+
+/// Weights of four neighbouring nodes: the uniform cubic B-spline at `t` in 0..1 between the second
+/// and the third.
+fn values(t: f64) -> [f64; 4] {
     let s = 1.0 - t;
     [
-        [
-            s * s * s / 6.0,
-            2.0 / 3.0 - t * t * (1.0 - 0.5 * t),
-            2.0 / 3.0 - s * s * (1.0 - 0.5 * s),
-            t * t * t / 6.0,
-        ],
-        [
-            -0.5 * s * s,
-            t * (1.5 * t - 2.0),
-            s * (2.0 - 1.5 * s),
-            0.5 * t * t,
-        ],
-        [s, 3.0 * t - 2.0, 3.0 * s - 2.0, t],
+        s * s * s / 6.0,
+        2.0 / 3.0 - t * t * (1.0 - 0.5 * t),
+        2.0 / 3.0 - s * s * (1.0 - 0.5 * s),
+        t * t * t / 6.0,
     ]
+}
+
+/// Their derivatives by t.
+fn slopes(t: f64) -> [f64; 4] {
+    let s = 1.0 - t;
+    [
+        -0.5 * s * s,
+        t * (1.5 * t - 2.0),
+        s * (2.0 - 1.5 * s),
+        0.5 * t * t,
+    ]
+}
+
+/// Their second derivatives by t.
+fn bends(t: f64) -> [f64; 4] {
+    let s = 1.0 - t;
+    [s, 3.0 * t - 2.0, 3.0 * s - 2.0, t]
 }
 
 #[cfg(test)]
@@ -430,6 +487,25 @@ mod tests {
             assert!(!deep || sample.distance < -5e-3);
             assert!(p.norm() < 0.105 || sample.distance > 2e-3);
         }
+    }
+
+    #[test]
+    fn a_sample_below_a_limit_is_the_sample_wherever_it_is_below_it() {
+        let field = DistanceField::new(&sphere(0.05, 3), 5e-3, 0.03);
+        let mut counts = [0, 0];
+        for i in 0..3000 {
+            let p = direction(i) * (0.09 * noise(i + 5).abs());
+            for limit in [-0.01, 0.0, 3e-3, 0.02] {
+                let sample = field.sample(p);
+                let below = sample.filter(|s| s.distance < limit);
+                assert_eq!(field.sample_below(p, limit), below);
+                assert_eq!(field.sample_with_hessian(p).map(|(s, _)| s), sample);
+                counts[usize::from(below.is_some())] += 1;
+            }
+        }
+        assert!(counts.iter().all(|n| *n > 1000), "{counts:?}");
+        assert_eq!(field.sample_below(Vec3::repeat(f64::NAN), 1.0), None);
+        assert_eq!(field.sample_below(Vec3::repeat(9.0), 1.0), None);
     }
 
     #[test]

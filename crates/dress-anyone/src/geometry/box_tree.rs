@@ -4,8 +4,12 @@
 //! the same boxes give the same tree; when boxes move a little, [`BoxTree::refit`] keeps the
 //! splits. Boxes of very different size, as cloth has while its seams close, cost it little.
 //! Nodes lie in one flat array, depth first: the left child of node i is i + 1.
+//!
+//! Whole trees are compared leaf by leaf: the boxes of a leaf lie together, so one walk down the
+//! other tree serves them all.
 
 use super::Vec3;
+use rayon::prelude::*;
 
 /// Smallest and largest corner of a box \[m\].
 pub type Aabb = [Vec3; 2];
@@ -29,6 +33,15 @@ struct Node {
     count: u32,
 }
 
+impl Node {
+    /// Where a leaf's boxes lie.
+    fn places(&self) -> std::ops::Range<usize> {
+        self.first as usize..(self.first + self.count) as usize
+    }
+}
+
+/// Nodes whose leaves are compared by one task.
+const CHUNK: usize = 128;
 /// Most boxes in a leaf.
 const LEAF: usize = 4;
 /// Median splits halve, so even 2³² boxes stay below this depth.
@@ -56,11 +69,10 @@ impl BoxTree {
             .extend(self.order.iter().map(|&i| boxes[i as usize]));
         for n in (0..self.nodes.len()).rev() {
             let node = &self.nodes[n];
-            let first = node.first as usize;
             self.nodes[n].hull = if node.count > 0 {
-                hull(&self.boxes[first..first + node.count as usize])
+                hull(&self.boxes[node.places()])
             } else {
-                hull(&[self.nodes[n + 1].hull, self.nodes[first].hull])
+                hull(&[self.nodes[n + 1].hull, self.nodes[node.first as usize].hull])
             };
         }
     }
@@ -82,10 +94,88 @@ impl BoxTree {
                 height += 2;
                 continue;
             }
-            for place in node.first as usize..(node.first + node.count) as usize {
+            for place in node.places() {
                 if overlap(&self.boxes[place], query) {
                     visit(self.order[place]);
                 }
+            }
+        }
+    }
+
+    /// What `visit` finds in every pair of an own box and one of `other` that overlap, always in the
+    /// same order.
+    pub fn overlaps<T: Send>(
+        &self,
+        other: &Self,
+        visit: impl Fn(u32, u32) -> Option<T> + Sync,
+    ) -> Vec<T> {
+        self.by_leaf(|_, leaf, found| {
+            other.leaves_within(&leaf.hull, 0, |near| {
+                for i in leaf.places() {
+                    for j in near.places() {
+                        if overlap(&self.boxes[i], &other.boxes[j]) {
+                            found.extend(visit(self.order[i], other.order[j]));
+                        }
+                    }
+                }
+            });
+        })
+    }
+
+    /// What `visit` finds in every pair of own boxes that overlap, each pair once and the smaller
+    /// index first, always in the same order.
+    pub fn own_overlaps<T: Send>(&self, visit: impl Fn(u32, u32) -> Option<T> + Sync) -> Vec<T> {
+        self.by_leaf(|index, leaf, found| {
+            self.leaves_within(&leaf.hull, index, |near| {
+                for i in leaf.places() {
+                    for j in near.places().start.max(i + 1)..near.places().end {
+                        if overlap(&self.boxes[i], &self.boxes[j]) {
+                            let (a, b) = (self.order[i], self.order[j]);
+                            found.extend(visit(a.min(b), a.max(b)));
+                        }
+                    }
+                }
+            });
+        })
+    }
+
+    /// What `find` adds for each leaf, in the order of the leaves.
+    fn by_leaf<T: Send>(&self, find: impl Fn(u32, &Node, &mut Vec<T>) + Sync) -> Vec<T> {
+        let parts: Vec<Vec<T>> = (self.nodes.par_chunks(CHUNK).enumerate())
+            .map(|(chunk, nodes)| {
+                let mut found = Vec::new();
+                for (index, node) in nodes.iter().enumerate().filter(|(_, n)| n.count > 0) {
+                    find((chunk * CHUNK + index) as u32, node, &mut found);
+                }
+                found
+            })
+            .collect();
+        parts.into_iter().flatten().collect()
+    }
+
+    /// Visits every leaf, node `from` or later, whose hull overlaps `query`.
+    fn leaves_within(&self, query: &Aabb, from: u32, mut visit: impl FnMut(&Node)) {
+        let mut stack = [0_u32; MAX_DEPTH];
+        let mut height = usize::from(!self.nodes.is_empty());
+        while height > 0 {
+            height -= 1;
+            let index = stack[height];
+            let node = &self.nodes[index as usize];
+            if !overlap(&node.hull, query) {
+                continue;
+            }
+            if node.count > 0 {
+                if index >= from {
+                    visit(node);
+                }
+                continue;
+            }
+            stack[height] = node.first;
+            height += 1;
+            // All of the left subtree comes before its right sibling.
+            if from < node.first {
+                stack[height] = index + 1;
+                height += 1;
             }
         }
     }
@@ -184,6 +274,28 @@ mod tests {
         for query in &before {
             assert_eq!(found(&tree, query), brute(&after, query));
         }
+    }
+
+    #[test]
+    fn whole_trees_find_what_a_look_at_every_pair_finds() {
+        let (some, others) = (scattered(700, 1), scattered(300, 9001));
+        let (tree, other) = (BoxTree::new(&some), BoxTree::new(&others));
+        let mut found = tree.overlaps(&other, |i, j| Some((i, j)));
+        found.sort_unstable();
+        let mut expected = Vec::new();
+        for (i, a) in some.iter().enumerate() {
+            expected.extend(brute(&others, a).into_iter().map(|j| (i as u32, j)));
+        }
+        assert_eq!(found, expected);
+        let mut own = tree.own_overlaps(|i, j| Some((i, j)));
+        own.sort_unstable();
+        let mut expected = Vec::new();
+        for (i, a) in some.iter().enumerate() {
+            let later = brute(&some, a).into_iter().filter(|j| *j > i as u32);
+            expected.extend(later.map(|j| (i as u32, j)));
+        }
+        assert_eq!(own, expected);
+        assert!(own.len() > 100);
     }
 
     #[test]

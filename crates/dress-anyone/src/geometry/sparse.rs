@@ -6,8 +6,11 @@ mod general;
 use crate::geometry::{Mat3, Vec3};
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt::factor::LltRegularization;
+use faer::perm::PermRef;
+use faer::sparse::linalg::amd;
 use faer::sparse::linalg::cholesky::{
-    LltRef, SymbolicCholesky, SymmetricOrdering, factorize_symbolic_cholesky,
+    CholeskySymbolicParams, LltRef, SymbolicCholesky, SymmetricOrdering,
+    factorize_symbolic_cholesky,
 };
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use faer::{Conj, MatMut, Par, Side};
@@ -79,11 +82,12 @@ impl Structure {
         let n = 3 * vertex_count;
         let pattern =
             SymbolicSparseColMatRef::new_checked(n, n, &column_starts, None, &row_indices);
+        let (order, inverse) = elimination_order(vertex_count, &starts, &rows);
         let symbolic = factorize_symbolic_cholesky(
             pattern,
             Side::Lower,
-            SymmetricOrdering::Amd,
-            faer::sparse::linalg::cholesky::CholeskySymbolicParams::default(),
+            SymmetricOrdering::Custom(PermRef::new_checked(&order, &inverse, n)),
+            CholeskySymbolicParams::default(),
         )
         .expect("the structure of a mesh fits into memory");
         Self {
@@ -120,6 +124,29 @@ impl Structure {
     pub fn factor_size(&self) -> usize {
         self.symbolic.len_val()
     }
+}
+
+/// Approximate minimum degree on the blocks: the three unknowns of a vertex follow each other, and a
+/// graph of a third of the nodes and a ninth of the edges is ordered in less than half the time.
+/// Old index of each new one, and the reverse.
+fn elimination_order(count: usize, starts: &[usize], rows: &[u32]) -> (Vec<usize>, Vec<usize>) {
+    let rows: Vec<usize> = rows.iter().map(|row| *row as usize).collect();
+    let graph = SymbolicSparseColMatRef::new_checked(count, count, starts, None, &rows);
+    let (mut order, mut inverse) = (vec![0; count], vec![0; count]);
+    let scratch = amd::order_scratch::<usize>(count, rows.len());
+    amd::order(
+        &mut order,
+        &mut inverse,
+        graph,
+        amd::Control::default(),
+        MemStack::new(&mut MemBuffer::new(scratch)),
+    )
+    .expect("the structure of a mesh fits into memory");
+    let threefold = |order: Vec<usize>| {
+        let blocks = order.into_iter();
+        blocks.flat_map(|v| [3 * v, 3 * v + 1, 3 * v + 2]).collect()
+    };
+    (threefold(order), threefold(inverse))
 }
 
 /// A symmetric matrix of 3×3 blocks.
@@ -204,31 +231,59 @@ impl BlockMatrix {
 
     /// Cholesky factor; none when the matrix is not positive definite.
     pub fn factor(&self) -> Option<Factor> {
+        self.factor_in(&mut Workspace::default())
+    }
+
+    /// The same in memory that an earlier one has left behind: at thousands of vertices fresh pages
+    /// cost as much as a tenth of the arithmetic.
+    pub fn factor_in(&self, workspace: &mut Workspace) -> Option<Factor> {
         let s = &self.structure;
         let n = 3 * s.vertex_count;
         let pattern =
             SymbolicSparseColMatRef::new_checked(n, n, &s.column_starts, None, &s.row_indices);
         let matrix = SparseColMatRef::new(pattern, &self.values);
-        let mut values = vec![0.0; s.symbolic.len_val()];
         let scratch = s
             .symbolic
             .factorize_numeric_llt_scratch::<f64>(Par::Seq, faer::Spec::default());
+        let mut values = std::mem::take(&mut workspace.values);
+        values.resize(s.symbolic.len_val(), 0.0);
+        let buffer = workspace
+            .buffer
+            .take_if(|buffer| buffer.len() >= scratch.unaligned_bytes_required())
+            .unwrap_or_else(|| MemBuffer::new(scratch));
+        let buffer = workspace.buffer.insert(buffer);
         // One thread: the order of sums, and so every bit, stays the same on any machine.
-        s.symbolic
-            .factorize_numeric_llt(
-                &mut values,
-                matrix,
-                Side::Lower,
-                LltRegularization::default(),
-                Par::Seq,
-                MemStack::new(&mut MemBuffer::new(scratch)),
-                faer::Spec::default(),
-            )
-            .ok()?;
+        let result = s.symbolic.factorize_numeric_llt(
+            &mut values,
+            matrix,
+            Side::Lower,
+            LltRegularization::default(),
+            Par::Seq,
+            MemStack::new(buffer),
+            faer::Spec::default(),
+        );
+        if result.is_err() {
+            workspace.values = values;
+            return None;
+        }
         Some(Factor {
             structure: Arc::clone(s),
             values,
         })
+    }
+}
+
+/// Memory for factors, kept between them.
+#[derive(Default)]
+pub struct Workspace {
+    values: Vec<f64>,
+    buffer: Option<MemBuffer>,
+}
+
+impl Workspace {
+    /// Takes over the memory of a factor that has done its work.
+    pub fn recycle(&mut self, factor: Factor) {
+        self.values = factor.values;
     }
 }
 

@@ -1,5 +1,7 @@
 //! A garment put on a body: what holds it up, and its drape from the placed panels.
 
+mod coarse;
+
 use crate::body::Body;
 use crate::body::distance_field::DistanceField;
 use crate::garment::{Fabric, Garment};
@@ -81,22 +83,47 @@ pub fn drape_on(
     observe: &mut dyn FnMut(DrapeProgress) -> bool,
 ) -> Drape {
     let surface = DistanceField::new(&body.mesh, DistanceField::SPACING, DistanceField::OUTER);
-    let (x, start) = match &garment.drape {
-        Some(x) => (x.clone(), Start::Near),
-        None => {
-            let (x, short) = placed(garment, body);
-            (x, Start::Placed { short })
-        }
-    };
-    let mut cloth = Cloth::new(&garment.mesh, fabric);
-    cloth.holds = holds(garment, &x, hold);
-    let scene = Scene {
-        cloth: &cloth,
-        assembly: &Assembly::new(&cloth),
+    let on = Dressing {
+        body,
         surface: &surface,
-        params: sim,
+        fabric,
+        hold,
     };
-    drape(&scene, &garment.mesh.x_bar, x, start, observe)
+    match &garment.drape {
+        Some(x) => on.drape(garment, x, x.clone(), Start::Near, sim, observe),
+        None => coarse::from_panels(&on, garment, sim, observe),
+    }
+}
+
+/// A body, and what a garment on it is made of and held by.
+struct Dressing<'a> {
+    body: &'a Body,
+    surface: &'a DistanceField,
+    fabric: &'a Fabric,
+    hold: &'a HoldParams,
+}
+
+impl Dressing<'_> {
+    /// Drapes from `x`; what is held is held at its height in `placed` \[m\].
+    fn drape(
+        &self,
+        garment: &Garment,
+        placed: &[Vec3],
+        x: Vec<Vec3>,
+        start: Start,
+        sim: &SimParams,
+        observe: &mut dyn FnMut(DrapeProgress) -> bool,
+    ) -> Drape {
+        let mut cloth = Cloth::new(&garment.mesh, self.fabric);
+        cloth.holds = holds(garment, placed, self.hold);
+        let scene = Scene {
+            cloth: &cloth,
+            assembly: &Assembly::new(&cloth),
+            surface: self.surface,
+            params: sim,
+        };
+        drape(&scene, &garment.mesh.x_bar, x, start, observe)
+    }
 }
 
 /// A garment whose middle is below this part of the body's height is placed about the pelvis: the

@@ -11,7 +11,7 @@ use super::energy::layers::Pair;
 use super::layers::{Layers, hold_apart};
 use super::system::{Assembly, System};
 use crate::geometry::Vec3;
-use crate::geometry::sparse::Factor;
+use crate::geometry::sparse::{Factor, Workspace};
 use serde::{Deserialize, Serialize};
 
 /// How to look for equilibrium.
@@ -165,6 +165,7 @@ pub fn find<S: Surface>(
     let mut status = RestStatus::IterationLimit;
     let mut iterations = 0;
     let mut fresh_starts = 0;
+    let mut workspace = Workspace::default();
     loop {
         if !residual.is_finite() {
             status = RestStatus::NotFinite;
@@ -182,7 +183,8 @@ pub fn find<S: Surface>(
             break;
         }
         iterations += 1;
-        let Some(factor) = damped_factor(system, &touch, &x, sigma, exactness) else {
+        let factor = damped_factor(system, &touch, &x, sigma, exactness, &mut workspace);
+        let Some(factor) = factor else {
             // Less exact is more definite; not exact at all it is indefinite only by round-off.
             if exactness > 0.0 {
                 growth = (0.5 * growth).max(LEAST_GROWTH);
@@ -197,6 +199,7 @@ pub fn find<S: Surface>(
             continue;
         };
         let mut direction = factor.solve(&force);
+        workspace.recycle(factor);
         let farthest = direction.iter().map(Vec3::norm).fold(0.0, f64::max);
         if !farthest.is_finite() {
             status = RestStatus::NotFinite;
@@ -265,10 +268,11 @@ fn damped_factor<S: Surface>(
     x: &[Vec3],
     sigma: f64,
     exactness: f64,
+    workspace: &mut Workspace,
 ) -> Option<Factor> {
     let mut k = system.stiffness(&touch.assembly, x, &touch.pairs, exactness);
     k.add_diagonal(sigma, &system.rest.mass);
-    k.factor()
+    k.factor_in(workspace)
 }
 
 /// An accepted step.

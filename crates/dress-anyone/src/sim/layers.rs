@@ -17,7 +17,6 @@ use super::cloth::Cloth;
 use super::energy::layers::{Kind, LayerParams, Pair};
 use crate::geometry::box_tree::{Aabb, BoxTree, around};
 use crate::geometry::{Vec3, intersections};
-use rayon::prelude::*;
 use std::collections::BTreeMap;
 pub use stepping::Watch;
 
@@ -38,8 +37,20 @@ pub struct Layers {
     close: Vec<Vec<u32>>,
     /// Vertices where layers go through each other.
     tangled: Vec<bool>,
+    vertex_tree: BoxTree,
     triangle_tree: BoxTree,
     edge_tree: BoxTree,
+    near: Near,
+}
+
+/// Pairs that were found with room to spare, so that they serve for several moves.
+#[derive(Clone, Debug, Default)]
+struct Near {
+    pairs: Vec<Pair>,
+    /// Positions for which they were found \[m\]; empty when they are out of date.
+    from: Vec<Vec3>,
+    /// By how much beyond the thickness they were looked for \[m\].
+    room: f64,
 }
 
 /// What triangles beside an edge tell of it.
@@ -82,11 +93,14 @@ impl Layers {
             edges: edges.into_keys().collect(),
             close: close(cloth, 2.0 * params.thickness),
             tangled: vec![false; cloth.vertex_count],
+            vertex_tree: BoxTree::new(&[]),
             triangle_tree: BoxTree::new(&[]),
             edge_tree: BoxTree::new(&[]),
+            near: Near::default(),
         };
         if params.on {
             let still = vec![Vec3::zeros(); x.len()];
+            layers.vertex_tree = BoxTree::new(&swept(&singles(x.len()), x, &still, 0.0));
             layers.triangle_tree = BoxTree::new(&swept(&layers.triangles, x, &still, 0.0));
             layers.edge_tree = BoxTree::new(&swept(&layers.edges, x, &still, 0.0));
             layers.find_tangles(x);
@@ -107,6 +121,7 @@ impl Layers {
     /// Exempts what goes through itself at `x`, and its surroundings, and nothing else.
     pub fn find_tangles(&mut self, x: &[Vec3]) {
         self.tangled.fill(false);
+        self.near.from.clear();
         if !self.params.on {
             return;
         }
@@ -117,7 +132,8 @@ impl Layers {
             }
         }
         let stuck = STUCK * self.params.thickness;
-        for pair in self.pairs_within(x, stuck) {
+        let still = vec![Vec3::zeros(); x.len()];
+        for pair in self.search(x, &still, stuck) {
             for v in pair.vertices {
                 at[v as usize] = true;
             }
@@ -133,55 +149,56 @@ impl Layers {
 
     /// All pairs that come closer than the thickness while the cloth moves by `d` from `x`, in a
     /// fixed order; `spare` more \[m\] for moves yet unknown.
+    ///
+    /// A search costs more than a look at what it found, so short moves are searched for with room
+    /// to spare, and later ones make do with that until the room is used up.
     pub fn pairs(&mut self, x: &[Vec3], d: &[Vec3], spare: f64) -> Vec<Pair> {
         if !self.params.on {
             return Vec::new();
         }
         // What all cloth does alike brings no pieces closer.
-        let mean = d.iter().sum::<Vec3>() / d.len() as f64;
-        let d: Vec<Vec3> = d.iter().map(|d| d - mean).collect();
+        let d = without_mean(d);
         let reach = self.params.thickness + spare;
-        let triangle_boxes = swept(&self.triangles, x, &d, reach);
-        self.triangle_tree.refit(&triangle_boxes);
-        let edge_boxes = swept(&self.edges, x, &d, 0.5 * reach);
-        self.edge_tree.refit(&edge_boxes);
-        let near = |pair: &Pair| {
-            let v = pair.vertices.map(|v| v as usize);
-            let relative = relative_move(pair.kind, v.map(|v| d[v]));
-            pair.closest(v.map(|v| x[v])).r.norm() < reach + relative
-        };
-        let mut pairs: Vec<Pair> = (0..x.len() as u32)
-            .into_par_iter()
-            .flat_map_iter(|v| {
-                let (from, to) = (x[v as usize], x[v as usize] + d[v as usize]);
-                let mut found = Vec::new();
-                self.triangle_tree
-                    .overlapping(&around(&[from, to], 0.0), |t| {
-                        found.extend(self.point_triangle(v, t).filter(near));
-                    });
-                found
-            })
-            .collect();
-        pairs.par_extend(
-            (0..self.edges.len() as u32)
-                .into_par_iter()
-                .flat_map_iter(|e| {
-                    let mut found = Vec::new();
-                    self.edge_tree.overlapping(&edge_boxes[e as usize], |f| {
-                        if e < f {
-                            found.extend(self.edge_edge(e, f).filter(near));
-                        }
-                    });
-                    found
-                }),
-        );
-        pairs
+        if !self.near.serves(x, &d, spare) {
+            let farthest = d.iter().map(Vec3::norm).fold(0.0, f64::max);
+            let room = (MOVES_OF_ROOM * farthest).max(0.5 * self.most_room());
+            if room > self.most_room() {
+                return self.search(x, &d, reach);
+            }
+            let still = vec![Vec3::zeros(); x.len()];
+            self.near = Near {
+                room: spare + 2.0 * room,
+                pairs: self.search(x, &still, reach + 2.0 * room),
+                from: x.to_vec(),
+            };
+        }
+        let pairs = self.near.pairs.iter().copied();
+        pairs.filter(|p| comes_within(p, x, &d, reach)).collect()
     }
 
-    /// All pairs closer than `distance` \[m\] at `x`.
-    fn pairs_within(&mut self, x: &[Vec3], distance: f64) -> Vec<Pair> {
-        let still = vec![Vec3::zeros(); x.len()];
-        self.pairs(x, &still, distance - self.params.thickness)
+    /// The most room that it pays to search with \[m\]: beyond, every piece would meet its
+    /// neighbours' neighbours.
+    fn most_room(&self) -> f64 {
+        let lengths: f64 = self.squared_lengths.iter().map(|l| l.sqrt()).sum();
+        (ROOM * lengths / self.edges.len() as f64).max(ROOM * self.params.thickness)
+    }
+
+    /// All pairs that come closer than `reach` \[m\] while the cloth moves by `d` from `x`, in a
+    /// fixed order, found by boxes that enclose the moves.
+    fn search(&mut self, x: &[Vec3], d: &[Vec3], reach: f64) -> Vec<Pair> {
+        self.vertex_tree.refit(&swept(&singles(x.len()), x, d, 0.0));
+        self.triangle_tree
+            .refit(&swept(&self.triangles, x, d, reach));
+        self.edge_tree.refit(&swept(&self.edges, x, d, 0.5 * reach));
+        let near = |pair: &Pair| comes_within(pair, x, d, reach);
+        let mut pairs = (self.vertex_tree).overlaps(&self.triangle_tree, |v, t| {
+            self.point_triangle(v, t).filter(near)
+        });
+        pairs.extend(
+            self.edge_tree
+                .own_overlaps(|e, f| self.edge_edge(e, f).filter(near)),
+        );
+        pairs
     }
 
     /// Vertex `v` and triangle `t`, unless they are exempt.
@@ -215,6 +232,47 @@ impl Layers {
     }
 }
 
+impl Near {
+    /// Whether all that a move `d` from `x` brings within the thickness and `spare` is there: pieces
+    /// come closer by twice what any vertex does, against the mean of all.
+    fn serves(&self, x: &[Vec3], d: &[Vec3], spare: f64) -> bool {
+        if self.from.len() != x.len() {
+            return false;
+        }
+        let gone: Vec<Vec3> = x.iter().zip(&self.from).map(|(x, f)| x - f).collect();
+        let gone = without_mean(&gone);
+        let farthest = gone
+            .iter()
+            .zip(d)
+            .map(|(g, d)| g.norm_squared().max((g + d).norm_squared()))
+            .fold(0.0, f64::max);
+        spare + 2.0 * farthest.sqrt() <= self.room
+    }
+}
+
+/// Moves less the mean of all.
+fn without_mean(d: &[Vec3]) -> Vec<Vec3> {
+    let mean = d.iter().sum::<Vec3>() / d.len() as f64;
+    d.iter().map(|d| d - mean).collect()
+}
+
+/// Whether a pair may come closer than `reach` \[m\] while the cloth moves by `d` from `x`.
+fn comes_within(pair: &Pair, x: &[Vec3], d: &[Vec3], reach: f64) -> bool {
+    let v = pair.vertices.map(|v| v as usize);
+    let relative = relative_move(pair.kind, v.map(|v| d[v]));
+    pair.closest(v.map(|v| x[v])).r.norm() < reach + relative
+}
+
+/// Every vertex as a piece of its own.
+fn singles(count: usize) -> Vec<[u32; 1]> {
+    (0..count as u32).map(|v| [v]).collect()
+}
+
+/// Room as part of the mean edge length, and least room as part of the thickness.
+const ROOM: f64 = 0.3;
+/// Room as part of the farthest move, so that what was found serves for a few moves.
+const MOVES_OF_ROOM: f64 = 3.0;
+
 /// Part of the way to the parting plane that a vertex may go.
 const SHARE: f64 = 0.9;
 /// Passes in which the parting planes may move along with the cloth.
@@ -226,30 +284,29 @@ const MOVING_PASSES: usize = 3;
 /// The parting planes move along with the mean of their pair, so that layers fall together. Where
 /// that does not work out, because a vertex is held back elsewhere, planes stand still in the end.
 pub fn hold_apart(pairs: &[Pair], x: &[Vec3], d: &mut [Vec3]) -> bool {
+    let planes: Vec<Plane> = (pairs.iter())
+        .filter_map(|pair| Plane::between(pair, x, d))
+        .collect();
     let mut any = false;
     for pass in 0..=MOVING_PASSES {
         let mut parts = vec![1.0_f64; d.len()];
         let mut parted = true;
-        for pair in pairs {
-            let v = pair.vertices.map(|v| v as usize);
-            let at = v.map(|v| x[v]);
-            let Some(closest) = Some(pair.closest(at)).filter(|c| c.r.norm() > 0.0) else {
-                continue;
-            };
-            let n = closest.r.normalize();
-            let moves = v.map(|v| n.dot(&d[v]));
+        for plane in &planes {
+            let Plane {
+                vertices,
+                n,
+                rooms,
+                signs,
+            } = plane;
+            let moves = vertices.map(|v| n.dot(&d[v]));
             let plane = if pass < MOVING_PASSES {
                 0.25 * moves.iter().sum::<f64>()
             } else {
                 0.0
             };
-            let heights = at.map(|p| n.dot(&p));
-            let middle = middle(pair.kind, &closest.beta, &heights);
             for k in 0..4 {
-                // Towards the plane is positive.
-                let sign = if first_side(pair.kind, k) { -1.0 } else { 1.0 };
-                let (room, approach) = ((middle - heights[k]) * sign, (moves[k] - plane) * sign);
-                if approach > SHARE * room {
+                let (room, sign) = (rooms[k], signs[k]);
+                if (moves[k] - plane) * sign > SHARE * room {
                     // The plane's own move is given; what is left of the room is the vertex's.
                     let own = moves[k] * sign;
                     let allowed = SHARE * room + plane * sign;
@@ -259,7 +316,7 @@ pub fn hold_apart(pairs: &[Pair], x: &[Vec3], d: &mut [Vec3]) -> bool {
                     } else {
                         1.0
                     };
-                    parts[v[k]] = parts[v[k]].min(part);
+                    parts[vertices[k]] = parts[vertices[k]].min(part);
                     parted = false;
                 }
             }
@@ -273,6 +330,42 @@ pub fn hold_apart(pairs: &[Pair], x: &[Vec3], d: &mut [Vec3]) -> bool {
         }
     }
     any
+}
+
+/// The plane half way between the closest points of a pair.
+struct Plane {
+    vertices: [usize; 4],
+    n: Vec3,
+    /// Which way along n each vertex comes to the plane, and how far that is \[m\].
+    signs: [f64; 4],
+    rooms: [f64; 4],
+}
+
+impl Plane {
+    /// None where the moves `d` are too short to reach it, whatever part of them is taken: they then
+    /// stay within a share of half the distance, even where the plane moves as far.
+    fn between(pair: &Pair, x: &[Vec3], d: &[Vec3]) -> Option<Self> {
+        let vertices = pair.vertices.map(|v| v as usize);
+        let at = vertices.map(|v| x[v]);
+        let closest = pair.closest(at);
+        let delta = closest.r.norm();
+        let farthest = vertices.map(|v| d[v].norm_squared());
+        let farthest = farthest.into_iter().fold(0.0, f64::max).sqrt();
+        if !(0.0 < delta && SHARE * delta < 4.0 * farthest) {
+            return None;
+        }
+        let n = closest.r / delta;
+        let heights = at.map(|p| n.dot(&p));
+        let middle = middle(pair.kind, &closest.beta, &heights);
+        let sign = |k| if first_side(pair.kind, k) { -1.0 } else { 1.0 };
+        let signs: [f64; 4] = std::array::from_fn(sign);
+        Some(Self {
+            vertices,
+            n,
+            signs,
+            rooms: std::array::from_fn(|k| (middle - heights[k]) * signs[k]),
+        })
+    }
 }
 
 /// Whether corner `k` of a pair belongs to its first piece.

@@ -311,7 +311,7 @@ impl<'a, S: Surface> Stepper<'a, S> {
         let reach = self.contact.thickness + 2.0 * self.params.speed * self.params.dt;
         let touch = |point: &ContactPoint| {
             let p = point.at(x);
-            let (d, gradient) = self.surface.distance(p).filter(|(d, _)| *d < reach)?;
+            let (d, gradient) = self.surface.distance_below(p, reach)?;
             let normal = slope(gradient)?;
             let kappa = self.contact.stiffness * point.area;
             Some(Touch {

@@ -15,6 +15,11 @@ use serde::{Deserialize, Serialize};
 pub trait Surface: Sync {
     /// Signed distance \[m\] (positive outside) and its gradient; none where nothing is near.
     fn distance(&self, p: Vec3) -> Option<(f64, Vec3)>;
+    /// The same where the distance is below `limit` \[m\], and none elsewhere: most points of a
+    /// cloth are far from the body, which may be cheap to tell.
+    fn distance_below(&self, p: Vec3, limit: f64) -> Option<(f64, Vec3)> {
+        self.distance(p).filter(|(d, _)| *d < limit)
+    }
     /// Hessian of the distance \[1/m\]; zero where nothing is near.
     fn curvature(&self, p: Vec3) -> Mat3;
 }
@@ -22,6 +27,11 @@ pub trait Surface: Sync {
 impl Surface for DistanceField {
     fn distance(&self, p: Vec3) -> Option<(f64, Vec3)> {
         self.sample(p).map(|s| (s.distance, s.gradient))
+    }
+
+    fn distance_below(&self, p: Vec3, limit: f64) -> Option<(f64, Vec3)> {
+        self.sample_below(p, limit)
+            .map(|s| (s.distance, s.gradient))
     }
 
     fn curvature(&self, p: Vec3) -> Mat3 {
@@ -85,16 +95,16 @@ fn response(d: f64, h: f64) -> [f64; 3] {
 
 /// Energy of one point of contact stiffness `kappa` \[N/m\] at p, with offset h \[m\].
 pub fn energy(surface: &impl Surface, kappa: f64, h: f64, p: Vec3) -> f64 {
-    match surface.distance(p) {
-        Some((d, _)) if d < h => kappa * response(d, h)[0],
+    match surface.distance_below(p, h) {
+        Some((d, _)) => kappa * response(d, h)[0],
         _ => 0.0,
     }
 }
 
 /// −∂U/∂p \[N\].
 pub fn force(surface: &impl Surface, kappa: f64, h: f64, p: Vec3) -> Vec3 {
-    match surface.distance(p) {
-        Some((d, n)) if d < h => n * (kappa * response(d, h)[1]),
+    match surface.distance_below(p, h) {
+        Some((d, n)) => n * (kappa * response(d, h)[1]),
         _ => Vec3::zeros(),
     }
 }
@@ -108,7 +118,7 @@ pub fn stiffness(
     p: Vec3,
     curvature: f64,
 ) -> Option<Mat3> {
-    let (d, n) = surface.distance(p).filter(|(d, _)| *d < h)?;
+    let (d, n) = surface.distance_below(p, h)?;
     let [_, push, slope] = response(d, h);
     let mut k = n * n.transpose() * slope;
     if curvature > 0.0 {

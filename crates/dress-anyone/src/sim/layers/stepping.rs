@@ -3,8 +3,9 @@
 //! Finding pairs costs about as much as a few sweeps, so they are found with room to spare, and
 //! found anew when the cloth has used up that room. Nothing moves farther than the room that is
 //! left, and what it could meet on the way is held apart, so layers that start apart stay apart.
+//! All moves are counted against the mean of all: what falls as one piece uses up no room.
 
-use super::{Layers, hold_apart};
+use super::{Layers, hold_apart, without_mean};
 use crate::geometry::Vec3;
 use crate::sim::cloth::Cloth;
 use crate::sim::energy::layers::{LayerParams, Pair};
@@ -16,7 +17,7 @@ pub struct Watch {
     pairs: Vec<Pair>,
     /// Positions for which the pairs were found \[m\].
     from: Vec<Vec3>,
-    /// How far any vertex may go from there \[m\].
+    /// How far any vertex may go from there, against the mean \[m\].
     room: f64,
     /// The farthest `room` that is ever given \[m\].
     most: f64,
@@ -36,8 +37,6 @@ pub struct Apart {
     lambda: f64,
 }
 
-/// Room as part of the mean edge length: beyond, every piece would meet its neighbours' neighbours.
-const ROOM: f64 = 0.3;
 /// Room as part of the mean move of a step, so that pairs last for a few steps.
 const STEPS_OF_ROOM: f64 = 4.0;
 /// Steps between looks for tangles.
@@ -49,9 +48,8 @@ impl Watch {
     /// Watches `cloth`, now at `x` \[m\].
     pub fn new(cloth: &Cloth, params: LayerParams, x: &[Vec3]) -> Self {
         let layers = Layers::new(cloth, params, x);
-        let lengths: f64 = layers.squared_lengths.iter().map(|l| l.sqrt()).sum();
         Self {
-            most: (ROOM * lengths / layers.edges.len() as f64).max(params.thickness),
+            most: layers.most_room().max(params.thickness),
             layers,
             pairs: Vec::new(),
             from: Vec::new(),
@@ -76,11 +74,12 @@ impl Watch {
             self.countdown = LOOK;
             self.layers.find_tangles(x);
         }
-        let farthest = wish.iter().map(Vec3::norm).fold(0.0, f64::max);
+        let farthest = farthest(&without_mean(wish));
         if look || self.from.len() != x.len() || self.left(x) < farthest.min(0.25 * self.most) {
             self.room = (STEPS_OF_ROOM * farthest).min(self.most);
             let still = vec![Vec3::zeros(); x.len()];
-            self.pairs = self.layers.pairs(x, &still, 2.0 * self.room);
+            let reach = self.layers.thickness() + 2.0 * self.room;
+            self.pairs = self.layers.search(x, &still, reach);
             self.from = x.to_vec();
         }
         let h = self.layers.thickness();
@@ -149,22 +148,29 @@ impl Watch {
             return;
         }
         let left = self.left(before);
-        let mut moves: Vec<Vec3> = x.iter().zip(before).map(|(x, b)| x - b).collect();
-        for d in &mut moves {
+        let moves: Vec<Vec3> = x.iter().zip(before).map(|(x, b)| x - b).collect();
+        let mut moves_of_own = without_mean(&moves);
+        let mean = moves[0] - moves_of_own[0];
+        for d in &mut moves_of_own {
             let length = d.norm();
             if length > left {
                 *d *= left / length;
             }
         }
-        hold_apart(&self.pairs, before, &mut moves);
-        for ((x, b), d) in x.iter_mut().zip(before).zip(moves) {
-            *x = b + d;
+        hold_apart(&self.pairs, before, &mut moves_of_own);
+        for ((x, b), d) in x.iter_mut().zip(before).zip(moves_of_own) {
+            *x = b + mean + d;
         }
     }
 
     /// How far any vertex may still go \[m\].
     fn left(&self, x: &[Vec3]) -> f64 {
-        let gone = x.iter().zip(&self.from).map(|(x, f)| (x - f).norm());
-        (self.room - gone.fold(0.0, f64::max)).max(0.0)
+        let gone: Vec<Vec3> = x.iter().zip(&self.from).map(|(x, f)| x - f).collect();
+        (self.room - farthest(&without_mean(&gone))).max(0.0)
     }
+}
+
+/// The longest of some moves \[m\].
+fn farthest(moves: &[Vec3]) -> f64 {
+    moves.iter().map(Vec3::norm).fold(0.0, f64::max)
 }

@@ -34,7 +34,8 @@ fn two_sheets(gap: f64) -> (Cloth, Vec<Vec3>) {
 fn a_flat_sheet_does_not_touch_itself() {
     let (cloth, x) = two_sheets(0.1);
     let mut layers = Layers::new(&cloth, PARAMS, &x);
-    assert!(layers.pairs_within(&x, PARAMS.thickness).is_empty());
+    let still = vec![Vec3::zeros(); x.len()];
+    assert!(layers.pairs(&x, &still, 0.0).is_empty());
 }
 
 #[test]
@@ -63,6 +64,34 @@ fn the_search_finds_what_a_look_at_all_pairs_finds() {
         }
     }
     assert!(counted > 50, "the sheets must touch: {counted}");
+}
+
+#[test]
+fn pairs_found_with_room_are_those_of_a_search() {
+    let (cloth, mut x) = two_sheets(6e-3);
+    let mut layers = Layers::new(&cloth, PARAMS, &x);
+    let (mut served, mut counted) = (0, 0);
+    for step in 0..12 {
+        // The sheets close in on each other while all moves aside, now by more and now by less.
+        let size = if step % 5 == 4 { 2e-3 } else { 1e-4 };
+        let d: Vec<Vec3> = (0..x.len())
+            .map(|i| Vec3::from_fn(|c, _| size * noise(7 * i + c + 31 * step)) + Vec3::x() * 0.01)
+            .collect();
+        let own = without_mean(&d);
+        served += usize::from(layers.near.serves(&x, &own, 0.0));
+        let key = |p: &Pair| (p.vertices, p.kind == Kind::PointTriangle);
+        let mut found: Vec<_> = layers.pairs(&x, &d, 0.0).iter().map(key).collect();
+        let searched = layers.search(&x, &own, PARAMS.thickness);
+        let mut expected: Vec<_> = searched.iter().map(key).collect();
+        found.sort_unstable();
+        expected.sort_unstable();
+        assert_eq!(found, expected);
+        counted += found.len();
+        for (x, d) in x.iter_mut().zip(&d) {
+            *x += d;
+        }
+    }
+    assert!(served > 5 && counted > 100, "{served} {counted}");
 }
 
 #[test]
@@ -113,7 +142,8 @@ fn what_goes_through_itself_is_exempt_and_the_rest_is_not() {
     x[count].y -= 0.02;
     let mut layers = Layers::new(&cloth, PARAMS, &x);
     assert!(layers.tangled());
-    let pairs = layers.pairs_within(&x, PARAMS.thickness);
+    let still = vec![Vec3::zeros(); x.len()];
+    let pairs = layers.pairs(&x, &still, 0.0);
     assert!(!pairs.is_empty());
     for pair in pairs {
         assert!(!pair.vertices.contains(&(count as u32)), "{pair:?}");

@@ -1,0 +1,79 @@
+//! Placed panels draped from coarse to fine: a mesh of a quarter of the vertices comes to rest first,
+//! and the fine one starts from there.
+//!
+//! Closing seams and falling takes as many steps in any mesh, and a coarse one does them for a small
+//! part of the price. What it ends with needs to be near a state of rest only; the fine mesh's own
+//! static solve decides. Where the coarse cloth does not come to rest, or the carried one goes
+//! through itself, the fine mesh starts from its panels after all.
+
+use super::{Dressing, placed};
+use crate::garment::Garment;
+use crate::geometry::intersections;
+use crate::pattern::resample::resample;
+use crate::pattern::triangulate;
+use crate::sim::drape::DrapeProgress;
+use crate::sim::equilibrium::{EquilibriumParams, RestStatus};
+use crate::sim::{Drape, SimParams, Solver, Start};
+
+/// Vertices of a mesh over those of the next coarser one.
+const COARSENING: usize = 4;
+/// Fewest vertices of a mesh: a coarser one could not show sleeves and collars.
+const LEAST: usize = 400;
+/// Residual at which a coarse mesh is near enough to rest \[–\].
+const NEAR_REST: f64 = 1e-3;
+
+/// Drapes from the placed panels.
+pub(super) fn from_panels(
+    on: &Dressing<'_>,
+    garment: &Garment,
+    sim: &SimParams,
+    observe: &mut dyn FnMut(DrapeProgress) -> bool,
+) -> Drape {
+    let (placed, short) = placed(garment, on.body);
+    // Who asked to stop once is not asked again.
+    let mut go_on = true;
+    let mut observe = |progress| {
+        go_on = go_on && observe(progress);
+        go_on
+    };
+    if let Some(coarse) = coarser(garment, sim) {
+        let nearly = SimParams {
+            equilibrium: EquilibriumParams {
+                tolerance: sim.equilibrium.tolerance.max(NEAR_REST),
+                ..sim.equilibrium
+            },
+            ..*sim
+        };
+        let found = from_panels(on, &coarse, &nearly, &mut observe);
+        let carried = resample(&coarse.mesh, &found.x, &garment.mesh);
+        let apart = || intersections::within(&carried, &garment.mesh.cloth_triangles()).is_empty();
+        if found.status == RestStatus::AtRest && apart() {
+            let mut drape = on.drape(garment, &placed, carried, Start::Near, sim, &mut observe);
+            drape.iterations += found.iterations;
+            return drape;
+        }
+    }
+    let start = Start::Placed { short };
+    on.drape(garment, &placed, placed.clone(), start, sim, &mut observe)
+}
+
+/// The garment in a coarser mesh; none if it has few vertices, cannot be meshed so coarsely, or is
+/// draped in the paper's way.
+fn coarser(garment: &Garment, sim: &SimParams) -> Option<Garment> {
+    let fine = &garment.mesh;
+    let wanted = fine.cloth_vertex_count / COARSENING;
+    if sim.solver == Solver::Xpbd || wanted < LEAST {
+        return None;
+    }
+    let area: f64 = (0..fine.triangles.len())
+        .map(|t| fine.rest_area(t, &fine.x_bar))
+        .sum();
+    // Equilateral triangles, two for each vertex.
+    let edge = (2.0 / 3.0_f64.sqrt() * area / wanted as f64).sqrt();
+    Some(Garment {
+        name: garment.name.clone(),
+        pattern: garment.pattern.clone(),
+        mesh: triangulate::mesh(&garment.pattern, edge).ok()?,
+        drape: None,
+    })
+}
