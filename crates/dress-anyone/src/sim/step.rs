@@ -1,22 +1,25 @@
 //! One XPBD time step (paper §3.1; Macklin et al. 2016, with the velocity factor τ).
 //!
 //! x̃ = x + Δt v + Δt² g, then sweeps of (∇C M⁻¹ ∇Cᵀ + α̃) Δλ = −C − α̃λ over membrane, bending,
-//! contact and holds in a fixed order, then v ← τ (x − x_n)/Δt. It brings placed panels together;
+//! contact and holds in a fixed order (membrane and bending by colours, in lanes: [`stretch`],
+//! [`turn`]), then v ← τ (x − x_n)/Δt. It brings placed panels together;
 //! at usual sweep counts its rest state is centimetres too long (METHOD §1.5), so the static solve
 //! follows.
 //!
 //! A step can be recorded on a [`Tape`] and walked back through: [`pull_back`] is its exact adjoint.
 
+mod lanes;
 pub mod pull_back;
+mod stretch;
+mod turn;
 
 use super::cloth::{Cloth, ContactPoint, GRAVITY, Rest};
 use super::energy::contact::{ContactParams, Surface};
-use super::energy::membrane::{
-    Elasticity, Mat3x2, constraint, constraint_gradient, constraint_mass,
-};
 use super::layers::Watch;
 use crate::geometry::{Mat3, Vec3};
 use serde::{Deserialize, Serialize};
+use stretch::{Compliance, Stretch, Visit};
+use turn::Turn;
 
 /// How to step.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -76,12 +79,11 @@ pub struct Stepper<'a, S> {
     surface: &'a S,
     contact: ContactParams,
     params: StepParams,
-    /// 𝔻⁻¹ Δt⁻²: compliance of the membrane per rest area.
-    compliance: Mat3,
+    compliance: Compliance,
     /// 1/m.
     w: Vec<f64>,
-    lambda_membrane: Vec<Vec3>,
-    lambda_bend: Vec<Vec3>,
+    stretch: Stretch,
+    turn: Turn,
     lambda_hold: Vec<f64>,
     /// Keeps layers of cloth apart.
     watch: Watch,
@@ -107,7 +109,7 @@ pub struct Tape {
     /// Positions after the sweeps, before moves are shortened \[m\].
     swept: Vec<Vec3>,
     /// F and Δλ of each visit to a triangle; none where its system could not be solved.
-    membrane: Vec<Option<(Mat3x2, Vec3)>>,
+    membrane: Vec<Visit>,
     /// Δλ of each visit to a hinge.
     bend: Vec<Vec3>,
     /// Δλ of each visit to a hold.
@@ -127,11 +129,12 @@ impl<'a, S: Surface> Stepper<'a, S> {
         params: StepParams,
         watch: Watch,
     ) -> Self {
+        let w = inverse_masses(rest);
         Self {
-            compliance: inverse(&cloth.elasticity) / (params.dt * params.dt),
-            w: inverse_masses(rest),
-            lambda_membrane: vec![Vec3::zeros(); cloth.triangles.len()],
-            lambda_bend: vec![Vec3::zeros(); cloth.hinges.len()],
+            compliance: Compliance::new(&cloth.elasticity, params.dt),
+            stretch: Stretch::new(cloth, rest, &w),
+            turn: Turn::new(cloth, rest, &w, params.dt),
+            w,
             lambda_hold: vec![0.0; cloth.holds.len()],
             cloth,
             rest,
@@ -144,7 +147,12 @@ impl<'a, S: Surface> Stepper<'a, S> {
 
     /// Goes on with another rest shape of the same cloth.
     pub fn grow(&mut self, rest: &'a Rest) {
+        if std::ptr::eq(self.rest, rest) {
+            return;
+        }
         self.w = inverse_masses(rest);
+        self.stretch.grow(rest, &self.w);
+        self.turn.grow(rest, &self.w, self.params.dt);
         self.rest = rest;
     }
 
@@ -179,15 +187,19 @@ impl<'a, S: Surface> Stepper<'a, S> {
         for ((x, v), g) in state.x.iter_mut().zip(&state.v).zip(acceleration) {
             *x += *v * dt + g * (dt * dt);
         }
-        self.lambda_membrane.fill(Vec3::zeros());
-        self.lambda_bend.fill(Vec3::zeros());
+        self.stretch.reset();
+        self.turn.reset();
         self.lambda_hold.fill(0.0);
         let mut touching = self.touching(&before);
         let wish: Vec<Vec3> = state.x.iter().zip(&before).map(|(x, b)| x - b).collect();
         let mut apart = self.watch.constraints(&before, &wish, 1.0 / (dt * dt));
         for _ in 0..self.params.sweeps {
-            self.sweep_membrane(&mut state.x, tape.as_deref_mut());
-            self.sweep_bend(&mut state.x, tape.as_deref_mut());
+            let (membrane, bend) = match &mut tape {
+                Some(tape) => (Some(&mut tape.membrane), Some(&mut tape.bend)),
+                None => (None, None),
+            };
+            self.stretch.sweep(&self.compliance, &mut state.x, membrane);
+            self.turn.sweep(&mut state.x, bend);
             self.sweep_holds(&mut state.x, tape.as_deref_mut());
             self.watch.sweep(&mut apart, &self.w, &mut state.x);
             self.sweep_contact(&mut touching, &mut state.x, tape.as_deref_mut());
@@ -214,52 +226,6 @@ impl<'a, S: Surface> Stepper<'a, S> {
     /// τ/Δt \[1/s\]: velocity kept per move.
     fn kept(&self) -> f64 {
         (-self.params.drag * self.params.dt).exp() / self.params.dt
-    }
-
-    fn sweep_membrane(&mut self, x: &mut [Vec3], mut tape: Option<&mut Tape>) {
-        for (e, t) in self.cloth.triangles.iter().enumerate() {
-            let rest = &self.rest.triangles[e];
-            let w = t.map(|a| self.w[a as usize]);
-            let f = rest.gradient_of(t.map(|a| x[a as usize]));
-            let alpha_tilde = self.compliance / rest.area;
-            let system = alpha_tilde + constraint_mass(&f, &rest.weighted(w));
-            let lambda = &mut self.lambda_membrane[e];
-            let right = -constraint(&f) - alpha_tilde * *lambda;
-            let delta = solve_symmetric(&system, &right);
-            if let Some(tape) = &mut tape {
-                tape.membrane.push(delta.map(|delta| (f, delta)));
-            }
-            let Some(delta) = delta else {
-                continue;
-            };
-            *lambda += delta;
-            let y = constraint_gradient(&f, &delta);
-            for ((a, b), w) in t.iter().zip(rest.gradients()).zip(w) {
-                x[*a as usize] += y * (b * w);
-            }
-        }
-    }
-
-    fn sweep_bend(&mut self, x: &mut [Vec3], mut tape: Option<&mut Tape>) {
-        let per_time = 1.0 / (self.params.dt * self.params.dt);
-        for (e, hinge) in self.cloth.hinges.iter().enumerate() {
-            let rest = &self.rest.hinges[e];
-            let alpha_tilde = per_time / rest.stiffness;
-            let c = rest.curvature_vector(hinge.vertices.map(|a| x[a as usize]));
-            let mut inverse_mass = alpha_tilde;
-            for (a, k) in hinge.vertices.iter().zip(rest.k) {
-                inverse_mass += self.w[*a as usize] * k * k;
-            }
-            let lambda = &mut self.lambda_bend[e];
-            let delta = -(c + *lambda * alpha_tilde) / inverse_mass;
-            *lambda += delta;
-            for (a, k) in hinge.vertices.iter().zip(rest.k) {
-                x[*a as usize] += delta * (self.w[*a as usize] * k);
-            }
-            if let Some(tape) = &mut tape {
-                tape.bend.push(delta);
-            }
-        }
     }
 
     fn sweep_holds(&mut self, x: &mut [Vec3], mut tape: Option<&mut Tape>) {
@@ -352,22 +318,6 @@ impl Tape {
 /// 1/m \[1/kg\], `[cloth vertex]`.
 fn inverse_masses(rest: &Rest) -> Vec<f64> {
     rest.mass.iter().map(|m| 1.0 / m).collect()
-}
-
-/// 𝔻⁻¹ \[m/N\].
-fn inverse(d: &Elasticity) -> Mat3 {
-    let determinant = d.weft * d.warp - d.coupling * d.coupling;
-    Mat3::new(
-        d.warp / determinant,
-        -d.coupling / determinant,
-        0.0,
-        -d.coupling / determinant,
-        d.weft / determinant,
-        0.0,
-        0.0,
-        0.0,
-        1.0 / d.shear,
-    )
 }
 
 /// A x = b for symmetric positive definite 3×3 A, by LDLᵀ; none if a pivot is not positive.

@@ -19,8 +19,9 @@ use crate::sim::{Drape, SimParams, Solver, Start};
 const COARSENING: usize = 4;
 /// Fewest vertices of a mesh: a coarser one could not show sleeves and collars.
 const LEAST: usize = 400;
-/// Residual at which a coarse mesh is near enough to rest \[–\].
-const NEAR_REST: f64 = 1e-3;
+/// Residual at which a coarse mesh is near enough to rest \[–\]: its energy then falls by some 10⁻⁵
+/// more, and its forces are small beside those that the finer mesh begins with.
+const NEAR_REST: f64 = 1.0;
 
 /// Drapes from the placed panels.
 pub(super) fn from_panels(
@@ -76,4 +77,42 @@ fn coarser(garment: &Garment, sim: &SimParams) -> Option<Garment> {
         mesh: triangulate::mesh(&garment.pattern, edge).ok()?,
         drape: None,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::loss::fixtures::two_panels;
+
+    /// Two panels that would be too small for a coarser mesh, in a mesh of their own.
+    fn garment(edge: f64) -> Garment {
+        let (pattern, _) = two_panels();
+        Garment {
+            name: "tube".to_owned(),
+            mesh: triangulate::mesh(&pattern, edge).expect("two rectangles can be meshed"),
+            pattern,
+            drape: None,
+        }
+    }
+
+    #[test]
+    fn a_coarser_mesh_has_about_a_quarter_of_the_vertices() {
+        let fine = garment(0.008);
+        let count = fine.mesh.cloth_vertex_count;
+        assert!(count > COARSENING * LEAST);
+        let coarse = coarser(&fine, &SimParams::default()).expect("it is fine enough");
+        let ratio = count as f64 / coarse.mesh.cloth_vertex_count as f64;
+        // Boundaries count more in a coarse mesh.
+        assert!((0.8..1.2).contains(&(ratio / COARSENING as f64)), "{ratio}");
+    }
+
+    #[test]
+    fn few_vertices_and_the_papers_way_have_no_coarser_mesh() {
+        assert!(coarser(&garment(0.05), &SimParams::default()).is_none());
+        let paper = SimParams {
+            solver: Solver::Xpbd,
+            ..SimParams::default()
+        };
+        assert!(coarser(&garment(0.008), &paper).is_none());
+    }
 }

@@ -5,13 +5,15 @@
 //! and r = −C − α̃ λ. Walking back, the visits are undone one by one, and each hands the gradients
 //! by what it wrote on to what it read: positions, λ, inverse masses w and rest data. With
 //! r̂ = A⁻¹ Δλ̂ no derivative of A⁻¹ is ever formed. The functions stand in the order of those they
-//! differentiate, in `step.rs`. Layers of cloth are left out: the cloth must not feel itself.
+//! differentiate, in `step.rs`, `step/stretch.rs` and `step/turn.rs`. Layers of cloth are left out: the cloth must not feel itself.
 
 use super::{CREASE, State, Stepper, Tape, Touch};
-use crate::geometry::{Mat2, Vec2, Vec3};
+use crate::geometry::{Mat2, Mat3, Vec2, Vec3};
 use crate::sim::cloth::{Cloth, Rest};
 use crate::sim::energy::contact::Surface;
-use crate::sim::energy::membrane::{Mat3x2, constraint_gradient, constraint_mass, symmetric};
+use crate::sim::energy::membrane::{
+    Elasticity, Mat3x2, constraint_gradient, constraint_mass, symmetric,
+};
 use crate::sim::step::solve_symmetric;
 
 /// Gradients by what follows from the rest shape.
@@ -31,8 +33,10 @@ pub struct RestHat {
 
 /// What is carried back from visit to visit.
 struct Back<'b> {
-    /// Positions, as the visits are undone.
+    /// Positions and λ, as the visits are undone.
     x: Vec<Vec3>,
+    lambda_membrane: Vec<Vec3>,
+    lambda_bend: Vec<Vec3>,
     x_hat: Vec<Vec3>,
     membrane: Vec<Vec3>,
     bend: Vec<Vec3>,
@@ -58,8 +62,10 @@ impl<S: Surface> Stepper<'_, S> {
         let mut back = Back {
             x: tape.swept.clone(),
             x_hat: std::mem::take(&mut hat.x),
-            membrane: vec![Vec3::zeros(); self.lambda_membrane.len()],
-            bend: vec![Vec3::zeros(); self.lambda_bend.len()],
+            lambda_membrane: self.stretch.lambda(),
+            lambda_bend: self.turn.lambda(),
+            membrane: vec![Vec3::zeros(); self.cloth.triangles.len()],
+            bend: vec![Vec3::zeros(); self.cloth.hinges.len()],
             holds: vec![0.0; self.lambda_hold.len()],
             contact: vec![0.0; tape.touching.len()],
             normal: vec![Vec3::zeros(); tape.touching.len()],
@@ -96,22 +102,25 @@ impl<S: Surface> Stepper<'_, S> {
     }
 
     /// With S(y) the matrix of [`symmetric`]: the visit moved corner a by w_a F S(Δλ) b_a.
-    fn pull_back_membrane(&mut self, tape: &Tape, sweep: usize, back: &mut Back<'_>) {
-        let count = self.cloth.triangles.len();
-        for e in (0..count).rev() {
-            let Some((f, delta)) = &tape.membrane[sweep * count + e] else {
+    fn pull_back_membrane(&self, tape: &Tape, sweep: usize, back: &mut Back<'_>) {
+        let order = self.stretch.order();
+        let visits = &tape.membrane[sweep * order.len()..];
+        let compliance = inverse(&self.cloth.elasticity) / (self.params.dt * self.params.dt);
+        for (e, visit) in order.iter().zip(visits).rev() {
+            let Some((f, delta)) = visit else {
                 continue;
             };
+            let e = *e as usize;
             let rest = &self.rest.triangles[e];
             let at = self.cloth.triangles[e].map(|a| a as usize);
             let w = at.map(|a| self.w[a]);
             let b = rest.gradients();
-            let alpha_tilde = self.compliance / rest.area;
+            let alpha_tilde = compliance / rest.area;
             let b_squared = rest.weighted(w);
             let system = alpha_tilde + constraint_mass(f, &b_squared);
             let hats = at.map(|a| back.x_hat[a]);
-            let lambda = self.lambda_membrane[e];
-            self.lambda_membrane[e] -= delta;
+            let lambda = back.lambda_membrane[e];
+            back.lambda_membrane[e] -= delta;
 
             // x̂ pulled back to Δλ, and on to r.
             let p: Mat3x2 = (0..3).map(|i| hats[i] * (b[i] * w[i]).transpose()).sum();
@@ -145,11 +154,12 @@ impl<S: Surface> Stepper<'_, S> {
         }
     }
 
-    fn pull_back_bend(&mut self, tape: &Tape, sweep: usize, back: &mut Back<'_>) {
+    fn pull_back_bend(&self, tape: &Tape, sweep: usize, back: &mut Back<'_>) {
         let per_time = 1.0 / (self.params.dt * self.params.dt);
-        let count = self.cloth.hinges.len();
-        for e in (0..count).rev() {
-            let delta = tape.bend[sweep * count + e];
+        let order = self.turn.order();
+        let visits = &tape.bend[sweep * order.len()..];
+        for (e, delta) in order.iter().zip(visits).rev() {
+            let e = *e as usize;
             let rest = &self.rest.hinges[e];
             let at = self.cloth.hinges[e].vertices.map(|a| a as usize);
             let alpha_tilde = per_time / rest.stiffness;
@@ -160,9 +170,9 @@ impl<S: Surface> Stepper<'_, S> {
                 delta_hat += back.x_hat[a] * (self.w[a] * k);
             }
             let r_hat = delta_hat / inverse_mass;
-            let by_mass = -r_hat.dot(&delta);
-            let by_alpha = -r_hat.dot(&self.lambda_bend[e]);
-            self.lambda_bend[e] -= delta;
+            let by_mass = -r_hat.dot(delta);
+            let by_alpha = -r_hat.dot(&back.lambda_bend[e]);
+            back.lambda_bend[e] -= delta;
             back.bend[e] -= r_hat * alpha_tilde;
             back.rest.stiffness[e] -= by_alpha * alpha_tilde / rest.stiffness;
             for (i, (a, k)) in at.into_iter().zip(rest.k).enumerate() {
@@ -261,6 +271,22 @@ impl<S: Surface> Stepper<'_, S> {
             }
         }
     }
+}
+
+/// 𝔻⁻¹ \[m/N\].
+fn inverse(d: &Elasticity) -> Mat3 {
+    let determinant = d.weft * d.warp - d.coupling * d.coupling;
+    Mat3::new(
+        d.warp / determinant,
+        -d.coupling / determinant,
+        0.0,
+        -d.coupling / determinant,
+        d.weft / determinant,
+        0.0,
+        0.0,
+        0.0,
+        1.0 / d.shear,
+    )
 }
 
 impl RestHat {
