@@ -3,11 +3,13 @@
 //! [`cloth`] is the topology, [`energy`] the pieces of the total energy U(x; x̄), each with its
 //! derivatives beside it. [`step`] is the paper's XPBD integrator, which brings placed panels
 //! together; [`equilibrium`] then finds f = −∂U/∂x = 0 by Newton's method, and [`adjoint`]
-//! differentiates that state. [`mod@drape`] does the three in order. [`trajectory`] drapes and
+//! differentiates that state. [`mod@drape`] does the first two in order, [`differentiable`] the third.
+//! [`trajectory`] drapes and
 //! differentiates as the paper does: by time steps alone, and all of them.
 
 pub mod adjoint;
 pub mod cloth;
+pub mod differentiable;
 pub mod drape;
 pub mod energy;
 pub mod equilibrium;
@@ -16,6 +18,7 @@ pub mod step;
 pub mod system;
 pub mod trajectory;
 pub use cloth::{Cloth, Hold, Rest};
+pub use differentiable::Differentiable;
 pub use drape::{Drape, Scene, SimParams, Solver, Start, drape};
 pub use system::Assembly;
 pub use trajectory::Trajectory;

@@ -2,7 +2,7 @@
 
 use crate::arguments::DrapeArguments;
 use crate::failure::Failure;
-use crate::inputs::{Gathering, Input, InputReport};
+use crate::inputs::{Gathering, Input, InputReport, note_placement};
 use crate::params::Params;
 use crate::picture::{View, pattern_png};
 use crate::progress::{Progress, stop_on_ctrl_c};
@@ -126,6 +126,7 @@ fn read(arguments: &DrapeArguments) -> Result<(Params, Loaded, Body), Failure> {
     if let Some((file, start)) = from.flatten() {
         loaded.garment.drape = Some(same_mesh(&loaded.garment, file, start)?);
     }
+    note_placement(&mut loaded, &body);
     Ok((params, loaded, body))
 }
 

@@ -3,7 +3,7 @@
 use crate::arguments::fitting::PairArguments;
 use crate::correspond::{How, correspond};
 use crate::failure::Failure;
-use crate::inputs::{AVERAGE, Gathering, HEAVY, Input, TSHIRT};
+use crate::inputs::{AVERAGE, Gathering, HEAVY, Input, TSHIRT, note_placement};
 use crate::params::Params;
 use crate::progress::Progress;
 use dress_anyone::body::Body;
@@ -58,7 +58,9 @@ impl<'a> Inputs<'a> {
         }
         gathering.finish()?;
         let all = params.zip(loaded).zip(source.zip(target));
-        let ((params, loaded), (source, target)) = all.expect("nothing was wrong with any of them");
+        let ((params, mut loaded), (source, target)) =
+            all.expect("nothing was wrong with any of them");
+        note_placement(&mut loaded, &source);
         progress.notes(&loaded.garment.name, &loaded.notes);
         progress.notes(&source.name, &source.notes);
         progress.notes(&target.name, &target.notes);

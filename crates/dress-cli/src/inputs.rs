@@ -5,6 +5,7 @@ use dress_anyone::body::{Body, FileFrame, UpAxis};
 use dress_anyone::io::body::{self, BodyOptions};
 use dress_anyone::io::garment::{self, GarmentOptions, Loaded};
 use dress_anyone::problem::BadInput;
+use dress_anyone::refit::dress;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
@@ -81,6 +82,17 @@ impl Gathering {
         } else {
             Err(Failure::Inputs(self.0))
         }
+    }
+}
+
+/// Notes how the panels of a garment that brings no drape come to `body`.
+pub fn note_placement(loaded: &mut Loaded, body: &Body) {
+    let up = dress::lift(&loaded.garment, body);
+    if loaded.garment.drape.is_none() && up > 0.0 {
+        loaded.notes.push(format!(
+            "the panels are placed about the pelvis of the body they were drawn on: they start {up:.2} m \
+             higher"
+        ));
     }
 }
 

@@ -152,6 +152,7 @@ fn of_size(criterion: &mut Criterion, size: usize) -> Vec<summary::Row> {
         surface: &surface,
         contact: params.contact,
         thickness: params.layers.thickness,
+        grips: &[],
     };
     group.bench_function("stiffness", |b| {
         b.iter(|| system.stiffness(&assembly, &at_rest, &[], 1.0));

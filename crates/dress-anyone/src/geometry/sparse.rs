@@ -1,6 +1,8 @@
 //! Symmetric sparse matrices of 3×3 blocks, one block row per vertex, and their Cholesky
 //! factors. The pattern is fixed, so the symbolic phase is done once and kept.
 
+mod general;
+
 use crate::geometry::{Mat3, Vec3};
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt::factor::LltRegularization;
@@ -12,6 +14,7 @@ use faer::sparse::linalg::cholesky::{
 };
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use faer::{Conj, MatMut, Par, Side};
+pub use general::GeneralFactor;
 use rayon::prelude::*;
 use std::sync::Arc;
 
@@ -207,19 +210,23 @@ impl BlockMatrix {
 
     /// Matrix times vector.
     pub fn multiply(&self, x: &[Vec3]) -> Vec<Vec3> {
-        let s = &self.structure;
         let mut y = vec![Vec3::zeros(); x.len()];
-        for column in 0..3 * s.vertex_count {
-            let (v, j) = (column / 3, column % 3);
-            for at in s.column_starts[column]..s.column_starts[column + 1] {
-                let (row, value) = (s.row_indices[at], self.values[at]);
-                y[row / 3][row % 3] += value * x[v][j];
-                if row != column {
-                    y[v][j] += value * x[row / 3][row % 3];
-                }
+        for (row, column, value) in self.entries() {
+            y[row / 3][row % 3] += value * x[column / 3][column % 3];
+            if row != column {
+                y[column / 3][column % 3] += value * x[row / 3][row % 3];
             }
         }
         y
+    }
+
+    /// (row, column, value) of the lower triangle, column by column.
+    fn entries(&self) -> impl Iterator<Item = (usize, usize, f64)> {
+        let s = &self.structure;
+        (0..3 * s.vertex_count).flat_map(move |column| {
+            let range = s.column_starts[column]..s.column_starts[column + 1];
+            range.map(move |at| (s.row_indices[at], column, self.values[at]))
+        })
     }
 
     /// Cholesky factor; none when the matrix is not positive definite.

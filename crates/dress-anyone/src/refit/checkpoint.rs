@@ -7,6 +7,7 @@ use super::RefitParams;
 use super::search::Steps;
 use crate::geometry::Vec3;
 use crate::report::Iteration;
+use crate::sim::energy::friction::Grip;
 use nalgebra::DVector;
 use serde::{Deserialize, Serialize};
 
@@ -23,6 +24,8 @@ pub struct Checkpoint {
     /// The best pattern's unknowns \[m\], its drape \[m\], and the gradient there \[1/m\].
     pub(super) zeta: Vec<f64>,
     pub(super) x: Vec<Vec3>,
+    /// Friction there; none without.
+    pub(super) grips: Vec<Grip>,
     pub(super) gradient: DVector<f64>,
     pub(super) adjoint_norm: f64,
     pub(super) residual: f64,

@@ -204,6 +204,10 @@ impl<'s, S: Surface> Search<'s, S> {
                     initial: initial.clone(),
                     zeta: best.zeta.clone(),
                     x: best.x.clone(),
+                    grips: best
+                        .state
+                        .as_ref()
+                        .map_or_else(Vec::new, |s| s.grips().to_vec()),
                     gradient: best.gradient.clone(),
                     adjoint_norm: best.adjoint_norm,
                     residual: best.residual,

@@ -6,7 +6,6 @@
 
 use super::cloth::{Cloth, GRAVITY, Rest};
 use super::energy::{bend, membrane};
-use crate::geometry::sparse::Factor;
 use crate::geometry::{Vec2, Vec3};
 
 /// λᵀ ∂f/∂x̄ at positions `x`: membrane, bending, and weight through the lumped masses. Contact
@@ -80,14 +79,4 @@ pub fn rest_push_forward(
         }
     }
     change
-}
-
-/// K⁻¹ applied to many force changes at once, given and returned column by column,
-/// `[column][vertex]` flattened to x, y, z.
-pub fn sensitivities(factor: &Factor, force_changes: impl Iterator<Item = Vec<Vec3>>) -> Vec<f64> {
-    let mut columns: Vec<f64> = force_changes
-        .flat_map(|column| column.into_iter().flat_map(|v| [v.x, v.y, v.z]))
-        .collect();
-    factor.solve_columns(&mut columns);
-    columns
 }

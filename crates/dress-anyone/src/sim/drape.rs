@@ -1,15 +1,13 @@
-//! The drape: from placed panels, or from a nearby drape, to rest; and the derivatives of the
-//! state it comes to.
+//! The drape: from placed panels, or from a nearby drape, to rest.
 
-use super::adjoint;
 use super::cloth::{Cloth, Rest};
 use super::energy::contact::{ContactParams, Surface};
+use super::energy::friction::Grip;
 use super::energy::layers::LayerParams;
 use super::equilibrium::{self, EquilibriumParams, RestStatus, Touch};
-use super::layers::{Layers, Watch, hold_apart};
+use super::layers::{Layers, Watch};
 use super::step::{State, StepParams, Stepper};
 use super::system::{Assembly, System};
-use crate::geometry::sparse::Factor;
 use crate::geometry::{Vec2, Vec3};
 use serde::{Deserialize, Serialize};
 
@@ -85,8 +83,10 @@ pub struct Drape {
     pub iterations: usize,
     /// How the search ended.
     pub status: RestStatus,
-    rest: Rest,
-    layers: Layers,
+    pub(super) rest: Rest,
+    pub(super) layers: Layers,
+    /// Friction of each contact point; none without friction.
+    pub(super) grips: Vec<Grip>,
 }
 
 /// The body and its params, with what is prepared once for a cloth.
@@ -134,38 +134,92 @@ pub fn drape<S: Surface>(
     };
     let mut layers = Layers::new(scene.cloth, params.layers, &x);
     let touch = Touch::at(scene.cloth, &mut layers, &x, scene.assembly.clone());
-    let found = equilibrium::find(
-        &system(scene, &rest),
-        &mut layers,
-        touch,
+    let mut grips = Vec::new();
+    if params.contact.friction > 0.0 {
+        grips.resize(scene.cloth.contacts.len(), Grip::default());
+    }
+    let mut drape = Drape {
         x,
-        sigma,
-        &search,
-        &mut |iteration, residual| {
-            observe(DrapeProgress::Settling {
-                iteration,
-                residual,
-            })
-        },
-    );
-    Drape {
-        x: found.x,
         x_bar: x_bar.to_vec(),
-        residual: found.residual,
-        iterations: found.iterations,
-        status: found.status,
+        residual: f64::INFINITY,
+        iterations: 0,
+        status: RestStatus::IterationLimit,
         rest,
         layers,
+        grips,
+    };
+    drape.settle(scene, touch, sigma, &search, &mut |iteration, residual| {
+        observe(DrapeProgress::Settling {
+            iteration,
+            residual,
+        })
+    });
+    drape
+}
+
+impl Drape {
+    /// The static solve, on from where it is; what may touch in the end. With friction, solves and
+    /// looks at what the body carries alternate until a look changes nothing; anchors are where the
+    /// first look finds what touches, or a later one finds it anew.
+    pub(super) fn settle<S: Surface>(
+        &mut self,
+        scene: &Scene<'_, S>,
+        mut touch: Touch,
+        mut sigma: f64,
+        params: &EquilibriumParams,
+        observe: &mut dyn FnMut(usize, f64) -> bool,
+    ) -> Touch {
+        let before = self.iterations;
+        loop {
+            self.look(scene);
+            let done = self.iterations - before;
+            let left = EquilibriumParams {
+                iterations: params.iterations - done,
+                ..*params
+            };
+            let found = equilibrium::find(
+                &system(scene, &self.rest, &self.grips),
+                &mut self.layers,
+                touch,
+                std::mem::take(&mut self.x),
+                sigma,
+                &left,
+                &mut |iteration, residual| observe(done + iteration, residual),
+            );
+            self.x = found.x;
+            self.residual = found.residual;
+            self.status = found.status;
+            self.iterations += found.iterations;
+            (touch, sigma) = (found.touch, 0.0);
+            let still = found.iterations == 0 || self.grips.is_empty();
+            if still || found.status != RestStatus::AtRest {
+                return touch;
+            }
+        }
+    }
+
+    /// Lets the grips see what the body carries.
+    fn look<S: Surface>(&mut self, scene: &Scene<'_, S>) {
+        let contact = &scene.params.contact;
+        for (grip, point) in self.grips.iter_mut().zip(&scene.cloth.contacts) {
+            let at = [contact.stiffness * point.area, contact.thickness];
+            grip.look(scene.surface, contact.friction, at, point.at(&self.x));
+        }
     }
 }
 
-fn system<'a, S>(scene: &Scene<'a, S>, rest: &'a Rest) -> System<'a, S> {
+pub(super) fn system<'a, S>(
+    scene: &Scene<'a, S>,
+    rest: &'a Rest,
+    grips: &'a [Grip],
+) -> System<'a, S> {
     System {
         cloth: scene.cloth,
         rest,
         surface: scene.surface,
         contact: scene.params.contact,
         thickness: scene.params.layers.thickness,
+        grips,
     }
 }
 
@@ -219,174 +273,6 @@ fn gather<S: Surface>(
         stepper.step(&mut state, step_params.inflation * left.max(0.0));
     }
     state.x
-}
-
-/// A polished drape with the factor of its exact stiffness: what can be differentiated.
-pub struct Differentiable<'a> {
-    cloth: &'a Cloth,
-    /// The polished state.
-    pub drape: Drape,
-    factor: Factor,
-    /// σ \[1/s²\] that had to be added to make the stiffness definite; 0 at a proper minimum.
-    pub shift: f64,
-}
-
-/// First shift tried when the stiffness at rest is indefinite \[1/s²\]; small beside the softest
-/// modes of a garment (a pendulum of 1 m has g/l ≈ 10).
-const FIRST_SHIFT: f64 = 1e-3;
-
-/// Kicks off saddles before the stiffness is shifted instead.
-const KICKS: usize = 3;
-/// Farthest any vertex moves in a kick \[m\].
-const KICK: f64 = 1e-3;
-
-impl Drape {
-    /// Polishes the state and factors its exact stiffness. A state whose stiffness is indefinite is
-    /// a saddle: it is left along its softest mode, and settles anew. Where that does not help the
-    /// stiffness is shifted just as far as needed, and [`Differentiable::shift`] says so.
-    pub fn differentiable<'a, S: Surface>(
-        mut self,
-        scene: &Scene<'a, S>,
-    ) -> Option<Differentiable<'a>> {
-        let params = &scene.params.equilibrium;
-        let system = system(scene, &self.rest);
-        let polish = EquilibriumParams {
-            iterations: 40,
-            tolerance: params.polished,
-            ..*params
-        };
-        let mut sigma = 0.0;
-        let mut kicks = 0;
-        let assembly = scene.assembly.clone();
-        let mut touch = Touch::at(scene.cloth, &mut self.layers, &self.x, assembly);
-        let (factor, shift) = loop {
-            let start = std::mem::take(&mut self.x);
-            let layers = &mut self.layers;
-            let still = &mut |_, _| true;
-            let found = equilibrium::find(&system, layers, touch, start, sigma, &polish, still);
-            self.iterations += found.iterations;
-            self.residual = found.residual;
-            self.x = found.x;
-            touch = found.touch;
-            let (factor, shift) = shifted_factor(&system, &touch, &self.x)?;
-            if shift == 0.0 || kicks == KICKS {
-                break (factor, shift);
-            }
-            kicks += 1;
-            sigma = shift;
-            let mut kick = softest_mode(&system, &factor);
-            for d in &mut kick {
-                *d *= KICK;
-            }
-            hold_apart(&self.layers.pairs(&self.x, &kick, 0.0), &self.x, &mut kick);
-            for (x, d) in self.x.iter_mut().zip(kick) {
-                *x += d;
-            }
-            touch = Touch::at(scene.cloth, &mut self.layers, &self.x, touch.assembly);
-        };
-        Some(Differentiable {
-            cloth: scene.cloth,
-            drape: self,
-            factor,
-            shift,
-        })
-    }
-}
-
-/// The exact stiffness factored at positions that are at rest, whatever way led there; none if no
-/// shift makes it definite.
-pub fn differentiable_at<'a, S: Surface>(
-    scene: &Scene<'a, S>,
-    x_bar: &[Vec2],
-    x: Vec<Vec3>,
-) -> Option<Differentiable<'a>> {
-    let rest = scene.cloth.at_rest(x_bar);
-    let mut layers = Layers::new(scene.cloth, scene.params.layers, &x);
-    let touch = Touch::at(scene.cloth, &mut layers, &x, scene.assembly.clone());
-    let system = system(scene, &rest);
-    let residual = system.residual(&system.force(&x, &touch.pairs));
-    let (factor, shift) = shifted_factor(&system, &touch, &x)?;
-    let drape = Drape {
-        x,
-        x_bar: x_bar.to_vec(),
-        residual,
-        iterations: 0,
-        status: RestStatus::AtRest,
-        rest,
-        layers,
-    };
-    Some(Differentiable {
-        cloth: scene.cloth,
-        drape,
-        factor,
-        shift,
-    })
-}
-
-/// Factor of K + σM with the smallest σ tried that makes it definite, and σ \[1/s²\].
-fn shifted_factor<S: Surface>(
-    system: &System<'_, S>,
-    touch: &Touch,
-    x: &[Vec3],
-) -> Option<(Factor, f64)> {
-    let mut shift = 0.0;
-    loop {
-        let mut k = system.stiffness(&touch.assembly, x, &touch.pairs, 1.0);
-        k.add_diagonal(shift, &system.rest.mass);
-        if let Some(factor) = k.factor() {
-            return Some((factor, shift));
-        }
-        shift = if shift == 0.0 {
-            FIRST_SHIFT
-        } else {
-            10.0 * shift
-        };
-        if !(shift < 1e9) {
-            return None;
-        }
-    }
-}
-
-/// The mode to which the shifted stiffness gives way most, by inverse iteration from unstructured
-/// forces; its farthest vertex moves by 1.
-fn softest_mode<S: Surface>(system: &System<'_, S>, factor: &Factor) -> Vec<Vec3> {
-    let unstructured = |i: usize| ((i as f64 + 1.0).sin() * 43_758.545_3).fract();
-    let vertices = 0..system.cloth.vertex_count;
-    let mut mode: Vec<Vec3> = vertices
-        .map(|a| Vec3::from_fn(|c, _| unstructured(3 * a + c)))
-        .collect();
-    for _ in 0..8 {
-        let forces: Vec<Vec3> = mode
-            .iter()
-            .zip(&system.rest.mass)
-            .map(|(d, m)| d * *m)
-            .collect();
-        mode = factor.solve(&forces);
-        let farthest = mode.iter().map(Vec3::norm).fold(0.0, f64::max);
-        for d in &mut mode {
-            *d /= farthest;
-        }
-    }
-    mode
-}
-
-impl Differentiable<'_> {
-    /// x̄̂ = (∂x/∂x̄)ᵀ x̂, and the adjoint λ = K⁻¹ x̂ it comes from.
-    pub fn pull_back(&self, x_hat: &[Vec3]) -> (Vec<Vec2>, Vec<Vec3>) {
-        let lambda = self.factor.solve(x_hat);
-        let drape = &self.drape;
-        let hat = adjoint::rest_pull_back(self.cloth, &drape.rest, &drape.x_bar, &drape.x, &lambda);
-        (hat, lambda)
-    }
-
-    /// ∂x along each motion of the rest shape, `[motion][vertex]` flattened to x, y, z.
-    pub fn sensitivities(&self, motions: impl Iterator<Item = Vec<Vec2>>) -> Vec<f64> {
-        let drape = &self.drape;
-        let push = |motion: Vec<Vec2>| {
-            adjoint::rest_push_forward(self.cloth, &drape.rest, &drape.x_bar, &drape.x, &motion)
-        };
-        adjoint::sensitivities(&self.factor, motions.map(push))
-    }
 }
 
 #[cfg(test)]

@@ -2,5 +2,6 @@
 
 pub mod bend;
 pub mod contact;
+pub mod friction;
 pub mod layers;
 pub mod membrane;

@@ -3,10 +3,11 @@
 
 use super::cloth::{Cloth, ContactPoint, GRAVITY, Rest};
 use super::energy::contact::{self, ContactParams, Surface};
+use super::energy::friction::Grip;
 use super::energy::layers::Pair;
 use super::energy::membrane;
-use crate::geometry::Vec3;
 use crate::geometry::sparse::{BlockMatrix, Slot, Structure};
+use crate::geometry::{Mat3, Vec3};
 use std::sync::Arc;
 
 /// Where each element's blocks go in the stiffness matrix; the same for every x and x̄, but for
@@ -102,6 +103,8 @@ pub struct System<'a, S> {
     pub contact: ContactParams,
     /// Distance at which layers of cloth begin to feel each other \[m\].
     pub thickness: f64,
+    /// Friction of each of the cloth's contact points; none at all without friction.
+    pub grips: &'a [Grip],
 }
 
 impl<S: Surface> System<'_, S> {
@@ -123,6 +126,9 @@ impl<S: Surface> System<'_, S> {
         for point in &self.cloth.contacts {
             let h = self.contact.thickness;
             sum += contact::energy(self.surface, self.kappa(point), h, point.at(x));
+        }
+        for (grip, point) in self.grips.iter().zip(&self.cloth.contacts) {
+            sum += grip.energy(self.kappa(point), point.at(x));
         }
         for hold in &self.cloth.holds {
             let off = x[hold.vertex as usize].y - hold.height;
@@ -157,6 +163,12 @@ impl<S: Surface> System<'_, S> {
         for point in &self.cloth.contacts {
             let h = self.contact.thickness;
             let force = contact::force(self.surface, self.kappa(point), h, point.at(x));
+            for a in point.ends {
+                f[a as usize] += 0.5 * force;
+            }
+        }
+        for (grip, point) in self.grips.iter().zip(&self.cloth.contacts) {
+            let force = grip.force(self.kappa(point), point.at(x));
             for a in point.ends {
                 f[a as usize] += 0.5 * force;
             }
@@ -215,10 +227,13 @@ impl<S: Surface> System<'_, S> {
                 k.add_scalar(*slot, if twice { 2.0 * value } else { value });
             }
         }
-        for (point, slots) in self.cloth.contacts.iter().zip(&assembly.contacts) {
+        for (i, (point, slots)) in (self.cloth.contacts.iter().zip(&assembly.contacts)).enumerate()
+        {
             let (kappa, h) = (self.kappa(point), self.contact.thickness);
             let p = point.at(x);
-            let Some(block) = contact::stiffness(self.surface, kappa, h, p, exactness) else {
+            let pressing = contact::stiffness(self.surface, kappa, h, p, exactness);
+            let gripping = self.grips.get(i).and_then(|grip| grip.stiffness(kappa, p));
+            let Some(block) = pressing.into_iter().chain(gripping).reduce(|a, b| a + b) else {
                 continue;
             };
             let [a, b] = point.ends;
@@ -232,10 +247,25 @@ impl<S: Surface> System<'_, S> {
             }
         }
         for hold in &self.cloth.holds {
-            let block = crate::geometry::Mat3::from_diagonal(&Vec3::new(0.0, hold.stiffness, 0.0));
+            let block = Mat3::from_diagonal(&Vec3::new(0.0, hold.stiffness, 0.0));
             k.add(assembly.vertices[hold.vertex as usize], &block);
         }
         k
+    }
+
+    /// What friction adds to −∂f/∂x that has no energy, as blocks at (row vertex, column vertex)
+    /// \[N/m\].
+    pub fn drift(&self, x: &[Vec3]) -> Vec<(u32, u32, Mat3)> {
+        let mut blocks = Vec::new();
+        for (grip, point) in self.grips.iter().zip(&self.cloth.contacts) {
+            let at = [self.kappa(point), self.contact.thickness];
+            let mu = self.contact.friction;
+            if let Some(block) = grip.drift(self.surface, mu, at, point.at(x)) {
+                let [a, b] = point.ends;
+                blocks.extend([(a, a), (a, b), (b, a), (b, b)].map(|(a, b)| (a, b, 0.25 * block)));
+            }
+        }
+        blocks
     }
 
     /// ‖f‖₂ / (‖m‖₂ |g|) \[–\].
@@ -278,15 +308,21 @@ mod tests {
         let contact = ContactParams {
             thickness: 0.02,
             stiffness: 1e4,
+            friction: 0.0,
         };
+        let mut x = fixtures::rolled(&mesh, 0.6, 0.092);
+        let mut grips = vec![Grip::default(); cloth.contacts.len()];
+        for (grip, point) in grips.iter_mut().zip(&cloth.contacts) {
+            grip.look(&surface, 0.3, [1e4 * point.area, 0.02], point.at(&x));
+        }
         let system = System {
             cloth: &cloth,
             rest: &rest,
             surface: &surface,
             contact,
             thickness: 0.055,
+            grips: &grips,
         };
-        let mut x = fixtures::rolled(&mesh, 0.6, 0.092);
         for (i, p) in x.iter_mut().enumerate() {
             *p += Vec3::from_fn(|c, _| 0.004 * noise(3 * i + c));
         }

@@ -105,6 +105,7 @@ impl<'a, S: Surface> Trajectory<'a, S> {
             surface: self.surface,
             contact: self.params.contact,
             thickness: self.params.layers.thickness,
+            grips: &[],
         };
         system.residual(&system.force(&self.last.x, &[]))
     }

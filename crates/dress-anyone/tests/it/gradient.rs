@@ -8,7 +8,7 @@ use dress_anyone::geometry::{Mat3, TriangleMesh, Vec2, Vec3};
 use dress_anyone::loss::{LossParams, Losses};
 use dress_anyone::pattern::{Curve, Edge, EdgeId, Panel, Pattern, Placement, Stitch, triangulate};
 use dress_anyone::refit::dress::{HoldParams, holds};
-use dress_anyone::sim::drape::Differentiable;
+use dress_anyone::sim::Differentiable;
 use dress_anyone::sim::{Assembly, Cloth, Scene, SimParams, Start, drape};
 
 /// A closed, tapered, flattened body of 0.7 m about the y axis, wider below.

@@ -6,7 +6,7 @@
 //! static solve decides. Where the coarse cloth does not come to rest, or the carried one goes
 //! through itself, the fine mesh starts from its panels after all.
 
-use super::{Dressing, above_the_feet};
+use super::{Dressing, placed};
 use crate::garment::Garment;
 use crate::geometry::intersections;
 use crate::pattern::resample::resample;
@@ -30,7 +30,7 @@ pub(super) fn from_panels(
     sim: &SimParams,
     observe: &mut dyn FnMut(DrapeProgress) -> bool,
 ) -> Drape {
-    let (placed, short) = above_the_feet(garment, on.body.mesh.bounds());
+    let (placed, short) = placed(garment, on.body);
     // Who asked to stop once is not asked again.
     let mut go_on = true;
     let mut observe = |progress| {

@@ -7,7 +7,7 @@ use crate::geometry::{Vec2, Vec3};
 use crate::loss::Loss;
 use crate::refit::checkpoint::Checkpoint;
 use crate::refit::{Progress, RefitError};
-use crate::sim::drape::{Differentiable, differentiable_at};
+use crate::sim::differentiable::{Differentiable, differentiable_at};
 use crate::sim::energy::contact::Surface;
 use crate::sim::equilibrium::RestStatus;
 use crate::sim::{Start, Trajectory, drape};
@@ -193,7 +193,8 @@ impl<'s, S: Surface> Search<'s, S> {
     pub(super) fn accept(&self, mut candidate: Candidate<'s, S>) -> Box<Point<'s>> {
         if let End::Rest(state) = &mut candidate.end {
             let (x, x_bar) = (state.drape.x.clone(), state.drape.x_bar.clone());
-            if let Some(anew) = differentiable_at(self.scene, &x_bar, x) {
+            let grips = state.grips().to_vec();
+            if let Some(anew) = differentiable_at(self.scene, &x_bar, x, grips) {
                 **state = anew;
             }
         }
@@ -226,6 +227,7 @@ impl<'s, S: Surface> Search<'s, S> {
                 self.scene,
                 &x_bar,
                 from.x.clone(),
+                from.grips.clone(),
             )?)),
             Gradient::Trajectory => None,
         };

@@ -63,9 +63,13 @@ fn check_gradient<S: Surface>(scene: &Scene<'_, S>, x_bar: &[Vec2], x: Vec<Vec3>
             .zip(&direction)
             .map(|(p, d)| p + d * s)
             .collect();
-        let there = settle(scene, &moved, at.drape.x.clone())
-            .differentiable(scene)
-            .expect("a minimum");
+        // On from there with all else that a drape remembers: friction's anchors.
+        let on = Drape {
+            rest: scene.cloth.at_rest(&moved),
+            x_bar: moved,
+            ..at.drape.clone()
+        };
+        let there = on.differentiable(scene).expect("a minimum");
         there
             .drape
             .x
@@ -100,6 +104,7 @@ fn firm_contact() -> SimParams {
     let contact = ContactParams {
         thickness: 0.003,
         stiffness: 1e5,
+        friction: 0.0,
     };
     SimParams {
         contact,
@@ -256,6 +261,7 @@ fn a_tight_tube_presses_as_laplace_says() {
         contact: ContactParams {
             thickness: 0.0,
             stiffness: 1e8,
+            friction: 0.0,
         },
         equilibrium: EquilibriumParams {
             tolerance: 1e-4,
@@ -267,7 +273,7 @@ fn a_tight_tube_presses_as_laplace_says() {
     let x = fixtures::rolled(&mesh, 0.6, 0.1001);
     let rest = cloth.at_rest(&mesh.x_bar);
     let drape = drape(&scene, &mesh.x_bar, x, Start::Near, &mut |_| true);
-    let system = system(&scene, &rest);
+    let system = system(&scene, &rest, &[]);
     assert_eq!(drape.status, RestStatus::AtRest);
     let push: f64 = cloth
         .contacts
@@ -319,4 +325,88 @@ fn what_nothing_holds_falls_and_is_reported() {
         .collect();
     let drape = drape(&scene, &mesh.x_bar, x, Start::Near, &mut |_| true);
     assert_eq!(drape.status, RestStatus::Sliding);
+}
+
+/// A plane through the origin that rises along x by `slope`.
+struct Incline {
+    slope: f64,
+}
+
+impl Surface for Incline {
+    fn distance(&self, p: Vec3) -> Option<(f64, Vec3)> {
+        let n = Vec3::new(-self.slope, 1.0, 0.0).normalize();
+        Some((n.dot(&p), n))
+    }
+
+    fn curvature(&self, _: Vec3) -> crate::geometry::Mat3 {
+        crate::geometry::Mat3::zeros()
+    }
+}
+
+#[test]
+fn a_sheet_on_an_incline_sticks_iff_it_is_less_steep_than_the_friction() {
+    let mesh = fixtures::sheet(6, 4, 0.03);
+    let cloth = Cloth::new(&mesh, &SOFT);
+    let assembly = Assembly::new(&cloth);
+    let mut params = firm_contact();
+    params.contact.friction = 0.4;
+    for (slope, sticks) in [(0.39, true), (0.41, false)] {
+        let incline = Incline { slope };
+        let scene = scene(&cloth, &assembly, &incline, &params);
+        let x: Vec<Vec3> = (mesh.x_bar.iter())
+            .map(|p| Vec3::new(p.x, slope * p.x, 0.0) / slope.hypot(1.0) + Vec3::z() * p.y)
+            .map(|p| p + Vec3::y() * 2e-3)
+            .collect();
+        let found = drape(&scene, &mesh.x_bar, x.clone(), Start::Near, &mut |_| true);
+        assert_eq!(
+            found.status == RestStatus::AtRest,
+            sticks,
+            "{:?}",
+            found.status
+        );
+        let moved = (x.iter().zip(&found.x)).map(|(a, b)| (b - a).norm());
+        let farthest = moved.fold(0.0, f64::max);
+        // A weight of 2 N/m² on ties of 0.2 · 1e5 N/m³ gives by 0.04 mm, and sinks in by 0.02 mm;
+        // what slips slides until it is told to.
+        assert_eq!(farthest < 2e-3, sticks, "{farthest}");
+    }
+}
+
+#[test]
+fn the_gradient_of_a_tube_with_friction_agrees_with_two_drapes() {
+    let mut mesh = fixtures::tube(24, 6, 0.025);
+    skew(&mut mesh);
+    let cloth = Cloth::new(&mesh, &SOFT);
+    let assembly = Assembly::new(&cloth);
+    let mut params = firm_contact();
+    params.contact.friction = 0.1;
+    let scene = scene(&cloth, &assembly, &TIGHT, &params);
+    // From where it lies without friction, let down a little: part of it sticks, part slips.
+    let slippery = SimParams {
+        contact: ContactParams {
+            friction: 0.0,
+            ..params.contact
+        },
+        ..params
+    };
+    let without = Scene {
+        params: &slippery,
+        ..scene
+    };
+    let x = settle(&without, &mesh.x_bar, fixtures::rolled(&mesh, 0.6, 0.11)).x;
+    let off = |i: usize| Vec3::from_fn(|c, _| 3e-4 * noise(5 * i + c));
+    let x: Vec<Vec3> = x.iter().enumerate().map(|(i, p)| p + off(i)).collect();
+    let found = settle(&scene, &mesh.x_bar, x.clone());
+    let slipping = (found.grips.iter().zip(&cloth.contacts))
+        .filter(|(g, c)| g.slips(params.contact.stiffness * c.area, c.at(&found.x)))
+        .count();
+    let sticking = (found.grips.iter())
+        .filter(|g| **g != Grip::default())
+        .count()
+        - slipping;
+    assert!(
+        slipping > 10 && sticking > 10,
+        "{slipping} slip, {sticking} stick"
+    );
+    check_gradient(&scene, &mesh.x_bar, x, 1e-5);
 }

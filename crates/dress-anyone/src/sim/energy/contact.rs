@@ -63,6 +63,9 @@ pub struct ContactParams {
     pub thickness: f64,
     /// κ₀ \[N/m³\]: pressure per depth. Higher sinks in less and solves slower.
     pub stiffness: f64,
+    /// Coulomb's coefficient μ of cloth on the body \[–\]: 0 lets it slide. Cloth on skin 0.3 to 0.6.
+    /// The paper has none.
+    pub friction: f64,
 }
 
 impl Default for ContactParams {
@@ -70,6 +73,7 @@ impl Default for ContactParams {
         Self {
             thickness: 3e-3,
             stiffness: 5e6,
+            friction: 0.0,
         }
     }
 }

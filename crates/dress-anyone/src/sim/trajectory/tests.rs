@@ -14,6 +14,7 @@ fn check<S: Surface>(cloth: &Cloth, surface: &S, mesh: &PatternMesh, x: &[Vec3],
         contact: ContactParams {
             thickness: 0.003,
             stiffness: 1e5,
+            friction: 0.0,
         },
         ..SimParams::default()
     };

@@ -29,6 +29,7 @@ fn check<S: Surface>(
     let contact = ContactParams {
         thickness: 0.01,
         stiffness: 1e5,
+        friction: 0.0,
     };
     let off = LayerParams {
         on: false,

@@ -37,6 +37,7 @@ impl<S: Surface> Setting<'_, S> {
             surface: self.scene.surface,
             contact: self.scene.params.contact,
             thickness: self.scene.params.layers.thickness,
+            grips: &[],
         }
     }
 

@@ -56,6 +56,7 @@ fn from_rest<S: Surface>(
         contact: ContactParams {
             thickness: 0.003,
             stiffness: 1e5,
+            friction: 0.0,
         },
         ..SimParams::default()
     };

@@ -1,0 +1,217 @@
+//! A drape with what its derivatives need: polished, its saddles left, its exact stiffness factored.
+
+use super::adjoint;
+use super::cloth::Cloth;
+use super::drape::{Drape, Scene, system};
+use super::energy::contact::Surface;
+use super::energy::friction::Grip;
+use super::equilibrium::{EquilibriumParams, RestStatus, Touch};
+use super::layers::{Layers, hold_apart};
+use super::system::System;
+use crate::geometry::sparse::{Factor, GeneralFactor};
+use crate::geometry::{Vec2, Vec3};
+
+/// A polished drape with the factor of its exact stiffness: what can be differentiated.
+pub struct Differentiable<'a> {
+    cloth: &'a Cloth,
+    /// The polished state.
+    pub drape: Drape,
+    factor: Stiffness,
+    /// σ \[1/s²\] that had to be added to make the stiffness definite; 0 at a proper minimum.
+    pub shift: f64,
+}
+
+/// The exact stiffness, factored.
+enum Stiffness {
+    /// Without friction it is symmetric.
+    Symmetric(Factor),
+    /// What slips makes it general.
+    General(Box<GeneralFactor>),
+}
+
+/// First shift tried when the stiffness at rest is indefinite \[1/s²\]; small beside the softest
+/// modes of a garment (a pendulum of 1 m has g/l ≈ 10).
+const FIRST_SHIFT: f64 = 1e-3;
+
+/// Kicks off saddles before the stiffness is shifted instead.
+const KICKS: usize = 3;
+/// Farthest any vertex moves in a kick \[m\].
+const KICK: f64 = 1e-3;
+
+impl Drape {
+    /// Polishes the state and factors its exact stiffness. A state whose stiffness is indefinite is
+    /// a saddle: it is left along its softest mode, and settles anew. Where that does not help the
+    /// stiffness is shifted just as far as needed, and [`Differentiable::shift`] says so.
+    pub fn differentiable<'a, S: Surface>(
+        mut self,
+        scene: &Scene<'a, S>,
+    ) -> Option<Differentiable<'a>> {
+        let params = &scene.params.equilibrium;
+        let polish = EquilibriumParams {
+            iterations: 40,
+            tolerance: params.polished,
+            ..*params
+        };
+        let mut sigma = 0.0;
+        let mut kicks = 0;
+        let assembly = scene.assembly.clone();
+        let mut touch = Touch::at(scene.cloth, &mut self.layers, &self.x, assembly);
+        let (factor, shift) = loop {
+            touch = self.settle(scene, touch, sigma, &polish, &mut |_, _| true);
+            let system = system(scene, &self.rest, &self.grips);
+            let (factor, shift) = shifted_factor(&system, &touch, &self.x)?;
+            if shift == 0.0 || kicks == KICKS {
+                break (exact(&system, &touch, &self.x, factor, shift)?, shift);
+            }
+            kicks += 1;
+            sigma = shift;
+            let mut kick = softest_mode(&system, &factor);
+            for d in &mut kick {
+                *d *= KICK;
+            }
+            hold_apart(&self.layers.pairs(&self.x, &kick, 0.0), &self.x, &mut kick);
+            for (x, d) in self.x.iter_mut().zip(kick) {
+                *x += d;
+            }
+            touch = Touch::at(scene.cloth, &mut self.layers, &self.x, touch.assembly);
+        };
+        Some(Differentiable {
+            cloth: scene.cloth,
+            drape: self,
+            factor,
+            shift,
+        })
+    }
+}
+
+/// The exact stiffness factored at positions that are at rest, whatever way led there; none if no
+/// shift makes it definite.
+pub fn differentiable_at<'a, S: Surface>(
+    scene: &Scene<'a, S>,
+    x_bar: &[Vec2],
+    x: Vec<Vec3>,
+    grips: Vec<Grip>,
+) -> Option<Differentiable<'a>> {
+    let rest = scene.cloth.at_rest(x_bar);
+    let mut layers = Layers::new(scene.cloth, scene.params.layers, &x);
+    let touch = Touch::at(scene.cloth, &mut layers, &x, scene.assembly.clone());
+    let system = system(scene, &rest, &grips);
+    let residual = system.residual(&system.force(&x, &touch.pairs));
+    let (factor, shift) = shifted_factor(&system, &touch, &x)?;
+    let factor = exact(&system, &touch, &x, factor, shift)?;
+    let drape = Drape {
+        x,
+        x_bar: x_bar.to_vec(),
+        residual,
+        iterations: 0,
+        status: RestStatus::AtRest,
+        rest,
+        layers,
+        grips,
+    };
+    Some(Differentiable {
+        cloth: scene.cloth,
+        drape,
+        factor,
+        shift,
+    })
+}
+
+/// The factor of the exact stiffness: `factor`, unless there is friction.
+fn exact<S: Surface>(
+    system: &System<'_, S>,
+    touch: &Touch,
+    x: &[Vec3],
+    factor: Factor,
+    shift: f64,
+) -> Option<Stiffness> {
+    if system.grips.is_empty() {
+        return Some(Stiffness::Symmetric(factor));
+    }
+    let mut k = system.stiffness(&touch.assembly, x, &touch.pairs, 1.0);
+    k.add_diagonal(shift, &system.rest.mass);
+    let general = GeneralFactor::new(&k, &system.drift(x))?;
+    Some(Stiffness::General(Box::new(general)))
+}
+
+/// Factor of K + σM with the smallest σ tried that makes it definite, and σ \[1/s²\].
+fn shifted_factor<S: Surface>(
+    system: &System<'_, S>,
+    touch: &Touch,
+    x: &[Vec3],
+) -> Option<(Factor, f64)> {
+    let mut shift = 0.0;
+    loop {
+        let mut k = system.stiffness(&touch.assembly, x, &touch.pairs, 1.0);
+        k.add_diagonal(shift, &system.rest.mass);
+        if let Some(factor) = k.factor() {
+            return Some((factor, shift));
+        }
+        shift = if shift == 0.0 {
+            FIRST_SHIFT
+        } else {
+            10.0 * shift
+        };
+        if !(shift < 1e9) {
+            return None;
+        }
+    }
+}
+
+/// The mode to which the shifted stiffness gives way most, by inverse iteration from unstructured
+/// forces; its farthest vertex moves by 1.
+fn softest_mode<S: Surface>(system: &System<'_, S>, factor: &Factor) -> Vec<Vec3> {
+    let unstructured = |i: usize| ((i as f64 + 1.0).sin() * 43_758.545_3).fract();
+    let vertices = 0..system.cloth.vertex_count;
+    let mut mode: Vec<Vec3> = vertices
+        .map(|a| Vec3::from_fn(|c, _| unstructured(3 * a + c)))
+        .collect();
+    for _ in 0..8 {
+        let forces: Vec<Vec3> = mode
+            .iter()
+            .zip(&system.rest.mass)
+            .map(|(d, m)| d * *m)
+            .collect();
+        mode = factor.solve(&forces);
+        let farthest = mode.iter().map(Vec3::norm).fold(0.0, f64::max);
+        for d in &mut mode {
+            *d /= farthest;
+        }
+    }
+    mode
+}
+
+impl Differentiable<'_> {
+    /// x̄̂ = (∂x/∂x̄)ᵀ x̂, and the adjoint λ = K⁻ᵀ x̂ it comes from.
+    pub fn pull_back(&self, x_hat: &[Vec3]) -> (Vec<Vec2>, Vec<Vec3>) {
+        let lambda = match &self.factor {
+            Stiffness::Symmetric(factor) => factor.solve(x_hat),
+            Stiffness::General(factor) => factor.solve_transposed(x_hat),
+        };
+        let drape = &self.drape;
+        let hat = adjoint::rest_pull_back(self.cloth, &drape.rest, &drape.x_bar, &drape.x, &lambda);
+        (hat, lambda)
+    }
+
+    /// ∂x along each motion of the rest shape, `[motion][vertex]` flattened to x, y, z.
+    pub fn sensitivities(&self, motions: impl Iterator<Item = Vec<Vec2>>) -> Vec<f64> {
+        let drape = &self.drape;
+        let push = |motion: Vec<Vec2>| {
+            adjoint::rest_push_forward(self.cloth, &drape.rest, &drape.x_bar, &drape.x, &motion)
+        };
+        let mut columns: Vec<f64> = motions
+            .flat_map(push)
+            .flat_map(|f| [f.x, f.y, f.z])
+            .collect();
+        match &self.factor {
+            Stiffness::Symmetric(factor) => factor.solve_columns(&mut columns),
+            Stiffness::General(factor) => factor.solve_columns(&mut columns),
+        }
+        columns
+    }
+
+    /// Friction of each contact point; none without friction.
+    pub fn grips(&self) -> &[Grip] {
+        &self.drape.grips
+    }
+}
