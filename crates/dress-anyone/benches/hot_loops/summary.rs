@@ -9,6 +9,8 @@ pub(crate) const YARDSTICK: &str = "yardstick";
 pub(crate) struct Row {
     pub(crate) group: String,
     pub(crate) loop_name: &'static str,
+    /// Runs of the loop in what was measured.
+    pub(crate) runs: usize,
     /// Of what `unit` names, per run of the loop.
     pub(crate) items: usize,
     pub(crate) unit: &'static str,
@@ -25,6 +27,7 @@ pub(crate) fn print(results: &Path, rows: &[Row]) {
         let Some(time) = median(&results.join(&row.group).join(row.loop_name)) else {
             continue;
         };
+        let time = time / row.runs as f64;
         println!(
             "{:>8}  {:<15} {:>10.3} {:>10.1} {:<10} {:>10.2}",
             row.group,
