@@ -96,19 +96,24 @@ pub fn drape_on(
         fabric,
         hold,
     };
+    let mut sim = *sim;
+    sim.equilibrium.iterations *= PATIENCE;
     let mut drape = |sim: &SimParams| match &garment.drape {
         Some(x) => on.drape(garment, x, x.clone(), Start::Near, sim, observe),
         None => coarse::from_panels(&on, garment, sim, observe),
     };
-    let found = drape(sim);
+    let found = drape(&sim);
     let may_hold = sim.contact.friction == 0.0 && hold.friction > 0.0;
     if found.status != RestStatus::Sliding || !may_hold {
         return found;
     }
-    let mut rough = *sim;
-    rough.contact.friction = hold.friction;
-    drape(&rough)
+    sim.contact.friction = hold.friction;
+    drape(&sim)
 }
+
+/// Iterations of a first drape over those of a drape in a search, where a pattern that takes long to
+/// settle is better given up: full skirts and hoods take 400 to 1300.
+const PATIENCE: usize = 4;
 
 /// A body, and what a garment on it is made of and held by.
 struct Dressing<'a> {
