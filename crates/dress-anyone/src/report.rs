@@ -55,6 +55,8 @@ pub struct DrapeReport {
     pub status: RestStatus,
     /// ‖f‖/(‖m‖|g|).
     pub residual: f64,
+    /// Coulomb's coefficient of cloth on the body \[–\].
+    pub friction: f64,
     /// Deepest cloth vertex inside the body's mesh \[m\]; 0 when none is.
     pub deepest_penetration: f64,
     /// Cloth vertices inside the body's mesh.

@@ -99,8 +99,13 @@ pub fn run(arguments: &DrapeArguments) -> Result<String, Failure> {
     } else {
         summary::rest(report.drape.status).to_owned()
     };
+    let held = if found.friction > refit.sim.contact.friction {
+        format!("Without friction it slides; {} holds it.\n", found.friction)
+    } else {
+        String::new()
+    };
     Ok(format!(
-        "The drape is {ending} after {seconds:.1} s.\n{}Written to {}\n",
+        "The drape is {ending} after {seconds:.1} s.\n{held}{}Written to {}\n",
         summary::penetration(&report.drape),
         arguments.out.display()
     ))

@@ -140,6 +140,7 @@ pub fn drape_report(
     DrapeReport {
         status: drape.map_or(RestStatus::AtRest, |d| d.status),
         residual: drape.map_or(0.0, |d| d.residual),
+        friction: drape.map_or(0.0, |d| d.friction),
         deepest_penetration: depths.iter().copied().fold(0.0, f64::max),
         vertices_inside: depths.iter().filter(|d| **d > 0.0).count(),
         through_body: intersections::between(x, &cloth, y, skin).len(),
@@ -149,7 +150,6 @@ pub fn drape_report(
     }
 }
 
-/// Singular values of a deformation gradient, smaller first.
 /// Least and largest stretch of a deformation gradient.
 pub(super) fn principal_stretches(f: &crate::sim::energy::membrane::Mat3x2) -> [f64; 2] {
     let c = f.transpose() * f;

@@ -105,6 +105,7 @@ pub fn differentiable_at<'a, S: Surface>(
         residual,
         iterations: 0,
         status: RestStatus::AtRest,
+        friction: scene.params.contact.friction,
         rest,
         layers,
         grips,

@@ -83,6 +83,8 @@ pub struct Drape {
     pub iterations: usize,
     /// How the search ended.
     pub status: RestStatus,
+    /// Coulomb's coefficient of cloth on the body \[–\].
+    pub friction: f64,
     pub(super) rest: Rest,
     pub(super) layers: Layers,
     /// Friction of each contact point; none without friction.
@@ -144,6 +146,7 @@ pub fn drape<S: Surface>(
         residual: f64::INFINITY,
         iterations: 0,
         status: RestStatus::IterationLimit,
+        friction: params.contact.friction,
         rest,
         layers,
         grips,

@@ -10,6 +10,7 @@
 
 mod lanes;
 pub mod pull_back;
+mod rub;
 mod stretch;
 mod turn;
 
@@ -116,7 +117,10 @@ pub struct Tape {
     holds: Vec<f64>,
     /// λ after each visit to a contact.
     contact: Vec<f64>,
+    /// Contacts with the λ they ended with.
     touching: Vec<Touch>,
+    /// How far friction drew each of them back \[m\].
+    rubbed: Vec<Vec3>,
 }
 
 impl<'a, S: Surface> Stepper<'a, S> {
@@ -204,6 +208,7 @@ impl<'a, S: Surface> Stepper<'a, S> {
             self.watch.sweep(&mut apart, &self.w, &mut state.x);
             self.sweep_contact(&mut touching, &mut state.x, tape.as_deref_mut());
         }
+        self.rub(&touching, &before, &mut state.x, tape.as_deref_mut());
         if let Some(tape) = tape {
             tape.before.clone_from(&before);
             tape.swept.clone_from(&state.x);
@@ -312,6 +317,7 @@ impl Tape {
         self.bend.clear();
         self.holds.clear();
         self.contact.clear();
+        self.rubbed.clear();
     }
 }
 

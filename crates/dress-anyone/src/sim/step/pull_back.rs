@@ -5,7 +5,8 @@
 //! and r = −C − α̃ λ. Walking back, the visits are undone one by one, and each hands the gradients
 //! by what it wrote on to what it read: positions, λ, inverse masses w and rest data. With
 //! r̂ = A⁻¹ Δλ̂ no derivative of A⁻¹ is ever formed. The functions stand in the order of those they
-//! differentiate, in `step.rs`, `step/stretch.rs` and `step/turn.rs`. Layers of cloth are left out: the cloth must not feel itself.
+//! differentiate, in `step.rs`, `step/stretch.rs` and `step/turn.rs`; friction stands in `step/rub.rs`
+//! both ways. Layers of cloth are left out: the cloth must not feel itself.
 
 use super::{CREASE, State, Stepper, Tape, Touch};
 use crate::geometry::{Mat2, Mat3, Vec2, Vec3};
@@ -28,23 +29,23 @@ pub struct RestHat {
     /// By B/(A₁+A₂), `[hinge]`.
     stiffness: Vec<f64>,
     /// By 1/m, `[cloth vertex]`.
-    w: Vec<f64>,
+    pub(super) w: Vec<f64>,
 }
 
 /// What is carried back from visit to visit.
-struct Back<'b> {
+pub(super) struct Back<'b> {
     /// Positions and λ, as the visits are undone.
-    x: Vec<Vec3>,
+    pub(super) x: Vec<Vec3>,
     lambda_membrane: Vec<Vec3>,
     lambda_bend: Vec<Vec3>,
-    x_hat: Vec<Vec3>,
+    pub(super) x_hat: Vec<Vec3>,
     membrane: Vec<Vec3>,
     bend: Vec<Vec3>,
     holds: Vec<f64>,
-    contact: Vec<f64>,
-    normal: Vec<Vec3>,
+    pub(super) contact: Vec<f64>,
+    pub(super) normal: Vec<Vec3>,
     offset: Vec<f64>,
-    rest: &'b mut RestHat,
+    pub(super) rest: &'b mut RestHat,
 }
 
 impl<S: Surface> Stepper<'_, S> {
@@ -72,6 +73,7 @@ impl<S: Surface> Stepper<'_, S> {
             offset: vec![0.0; tape.touching.len()],
             rest,
         };
+        self.pull_back_rub(tape, &mut back, &mut before_hat);
         for sweep in (0..self.params.sweeps).rev() {
             self.pull_back_contact(tape, sweep, &mut back);
             self.pull_back_holds(tape, sweep, &mut back);

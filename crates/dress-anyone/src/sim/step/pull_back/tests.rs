@@ -26,10 +26,22 @@ fn check<S: Surface>(
     params: StepParams,
     start: &State,
 ) {
+    check_with(mesh, cloth, surface, params, start, 0.0);
+}
+
+/// The same with friction.
+fn check_with<S: Surface>(
+    mesh: &PatternMesh,
+    cloth: &Cloth,
+    surface: &S,
+    params: StepParams,
+    start: &State,
+    friction: f64,
+) {
     let contact = ContactParams {
         thickness: 0.01,
         stiffness: 1e5,
-        friction: 0.0,
+        friction,
     };
     let off = LayerParams {
         on: false,
@@ -157,19 +169,40 @@ fn a_step_that_is_held_has_an_exact_adjoint() {
     check(&mesh, &cloth, &Nothing, three_sweeps(), &crumpled(&mesh));
 }
 
-#[test]
-fn a_step_against_a_body_has_an_exact_adjoint() {
-    let mesh = fixtures::tube(12, 4, 0.06);
-    let cloth = Cloth::new(&mesh, &SOFT);
-    let mut x = fixtures::rolled(&mesh, 0.72, 0.115);
+/// A tube that rubs against the cone.
+fn rubbing(mesh: &PatternMesh) -> State {
+    let mut x = fixtures::rolled(mesh, 0.72, 0.115);
     for (i, p) in x.iter_mut().enumerate() {
         *p += Vec3::from_fn(|c, _| 0.002 * noise(3 * i + c));
     }
     let v = (0..x.len())
         .map(|i| Vec3::from_fn(|c, _| 0.1 * noise(200 + 3 * i + c)))
         .collect();
-    let start = State { x, v };
-    check(&mesh, &cloth, &CONE, three_sweeps(), &start);
+    State { x, v }
+}
+
+#[test]
+fn a_step_against_a_body_has_an_exact_adjoint() {
+    let mesh = fixtures::tube(12, 4, 0.06);
+    let cloth = Cloth::new(&mesh, &SOFT);
+    check(&mesh, &cloth, &CONE, three_sweeps(), &rubbing(&mesh));
+}
+
+#[test]
+fn a_step_with_friction_has_an_exact_adjoint() {
+    let mesh = fixtures::tube(12, 4, 0.06);
+    let cloth = Cloth::new(&mesh, &SOFT);
+    // Little slips with much friction, and much with little.
+    for friction in [0.05, 3.0] {
+        check_with(
+            &mesh,
+            &cloth,
+            &CONE,
+            three_sweeps(),
+            &rubbing(&mesh),
+            friction,
+        );
+    }
 }
 
 #[test]
