@@ -158,7 +158,8 @@ fn does_not_rest(body: &str, status: RestStatus, residual: f64) -> String {
         RestStatus::Sliding => format!(
             "the garment slides off the body `{body}`: nothing holds it. Label the edges of its \
              waist or neckline (`lower_interface`), name their labels in the parameter \
-             `hold.labels`, or let friction hold it (`sim.contact.friction`, say 0.4)"
+             `hold.labels`, hold its upper rim (`hold.rim`), or let friction hold it \
+             (`sim.contact.friction`, say 0.4)"
         ),
         RestStatus::NotFinite => format!(
             "the drape on the body `{body}` broke down (positions are no longer numbers). Check \

@@ -6,6 +6,7 @@ use crate::body::Body;
 use crate::body::distance_field::DistanceField;
 use crate::garment::{Fabric, Garment};
 use crate::geometry::{Vec2, Vec3};
+use crate::pattern::{Edge, EdgeId};
 use crate::sim::drape::DrapeProgress;
 use crate::sim::equilibrium::RestStatus;
 use crate::sim::{Assembly, Cloth, Drape, Hold, Scene, SimParams, Start, drape};
@@ -25,6 +26,9 @@ pub struct HoldParams {
     /// Cloth that reaches this far above an edge hangs from what is up there: the waist of a dress
     /// needs no hold \[m\].
     pub carried: f64,
+    /// Whether the upper rim is held, too: free edges at the top of the garment. A pattern without labels
+    /// that slides off is draped again so.
+    pub rim: bool,
     /// Coulomb's coefficient of cloth on the body with which a garment is draped again that slides off
     /// without friction \[–\]; 0 lets it slide. Textiles on skin have 0.2 to 0.6 (Derler & Gerhardt
     /// 2012).
@@ -37,6 +41,7 @@ impl Default for HoldParams {
             labels: vec!["lower_interface".to_owned(), "strapless_top".to_owned()],
             stiffness: 1e4,
             carried: 0.15,
+            rim: false,
             friction: 0.4,
         }
     }
@@ -47,19 +52,24 @@ impl Default for HoldParams {
 pub fn holds(garment: &Garment, x: &[Vec3], params: &HoldParams) -> Vec<Hold> {
     let mesh = &garment.mesh;
     let top = x.iter().map(|p| p.y).fold(f64::NEG_INFINITY, f64::max);
-    let carried = |v: u32| top - x[mesh.sewing[v as usize] as usize].y > params.carried;
+    let below_top = |v: u32| top - x[mesh.sewing[v as usize] as usize].y;
+    let carried = |v: u32| below_top(v) > params.carried;
+    let sewn = |id: EdgeId| {
+        garment
+            .pattern
+            .stitches
+            .iter()
+            .any(|s| s.sides.contains(&id))
+    };
+    let free = |id: EdgeId| !sewn(id);
     let mut lengths: BTreeMap<u32, f64> = BTreeMap::new();
     for (p, panel) in garment.pattern.panels.iter().enumerate() {
         for (e, edge) in panel.edges.iter().enumerate() {
-            if !edge
-                .label
-                .as_ref()
-                .is_some_and(|l| params.labels.contains(l))
-            {
-                continue;
-            }
             let vertices = &mesh.edge_vertices[p][e];
-            if vertices.iter().all(|v| carried(*v)) {
+            let labelled = is_label(edge, params) && !vertices.iter().all(|v| carried(*v));
+            let id = EdgeId { panel: p, edge: e };
+            let on_rim = || vertices.iter().all(|v| below_top(*v) < RIM) && free(id);
+            if !labelled && !(params.rim && on_rim()) {
                 continue;
             }
             for pair in vertices.windows(2) {
@@ -79,8 +89,17 @@ pub fn holds(garment: &Garment, x: &[Vec3], params: &HoldParams) -> Vec<Hold> {
     lengths.into_iter().map(hold).collect()
 }
 
+/// Free edges that lie no lower than this under the top of a garment are its upper rim \[m\].
+const RIM: f64 = 0.08;
+
+/// Whether an edge has a label that says it is held.
+fn is_label(edge: &Edge, params: &HoldParams) -> bool {
+    (edge.label.as_ref()).is_some_and(|label| params.labels.contains(label))
+}
+
 /// Drapes a garment from its placed panels on `body`, or — when it brought a drape — from there. What
-/// slides off is draped again with friction.
+/// slides off is draped again held by its upper rim, if its pattern has no labels that would say what
+/// is held, or else with friction; where that does not help, it slides.
 pub fn drape_on(
     garment: &Garment,
     body: &Body,
@@ -90,25 +109,42 @@ pub fn drape_on(
     observe: &mut dyn FnMut(DrapeProgress) -> bool,
 ) -> Drape {
     let surface = DistanceField::new(&body.mesh, DistanceField::SPACING, DistanceField::OUTER);
-    let on = Dressing {
-        body,
-        surface: &surface,
-        fabric,
-        hold,
+    let mut patient = *sim;
+    patient.equilibrium.iterations *= PATIENCE;
+    let mut drape = |hold: &HoldParams, sim: &SimParams| {
+        let on = Dressing {
+            body,
+            surface: &surface,
+            fabric,
+            hold,
+        };
+        match &garment.drape {
+            Some(x) => on.drape(garment, x, x.clone(), Start::Near, sim, observe),
+            None => coarse::from_panels(&on, garment, sim, observe),
+        }
     };
-    let mut sim = *sim;
-    sim.equilibrium.iterations *= PATIENCE;
-    let mut drape = |sim: &SimParams| match &garment.drape {
-        Some(x) => on.drape(garment, x, x.clone(), Start::Near, sim, observe),
-        None => coarse::from_panels(&on, garment, sim, observe),
-    };
-    let found = drape(&sim);
-    let may_hold = sim.contact.friction == 0.0 && hold.friction > 0.0;
-    if found.status != RestStatus::Sliding || !may_hold {
+    let found = drape(hold, &patient);
+    if found.status != RestStatus::Sliding {
         return found;
     }
-    sim.contact.friction = hold.friction;
-    drape(&sim)
+    let mut edges = garment.pattern.panels.iter().flat_map(|panel| &panel.edges);
+    let again = if !hold.rim && !edges.any(|edge| is_label(edge, hold)) {
+        let rim = HoldParams {
+            rim: true,
+            ..hold.clone()
+        };
+        drape(&rim, &patient)
+    } else if sim.contact.friction < hold.friction {
+        patient.contact.friction = hold.friction;
+        drape(hold, &patient)
+    } else {
+        return found;
+    };
+    if again.status == RestStatus::AtRest {
+        again
+    } else {
+        found
+    }
 }
 
 /// Iterations of a first drape over those of a drape in a search, where a pattern that takes long to

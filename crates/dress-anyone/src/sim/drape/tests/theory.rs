@@ -185,7 +185,7 @@ fn sag(rows: usize) -> f64 {
     mesh.triangles.clear();
     for j in 0..=rows {
         for i in 0..=columns {
-            let aside = if j % 2 == 0 { 0.0 } else { 0.5 };
+            let aside = if j.is_multiple_of(2) { 0.0 } else { 0.5 };
             mesh.x_bar[at(i, j) as usize] = Vec2::new(h * (i as f64 + aside), height * j as f64);
         }
         for i in 0..columns {
@@ -197,7 +197,7 @@ fn sag(rows: usize) -> f64 {
             });
         }
     }
-    let aside = if rows % 2 == 0 { 0.5 } else { 0.0 };
+    let aside = if rows.is_multiple_of(2) { 0.5 } else { 0.0 };
     for i in 0..=columns {
         let end = at(i, rows + 1) as usize;
         mesh.x_bar[end] = Vec2::new(h * (i as f64 + aside), height * (rows + 1) as f64);
