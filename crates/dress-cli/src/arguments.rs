@@ -1,5 +1,6 @@
 //! The command line.
 
+pub mod design;
 pub mod fitting;
 
 use crate::body::arguments::BodyCommand;
@@ -12,6 +13,7 @@ use dress_anyone::io::garment_obj::UvOptions;
 use dress_anyone::io::garmentcode::RotationOrder;
 use dress_anyone::problem::BadInput;
 use dress_anyone::sim::Solver;
+use design::DesignArguments;
 use fitting::{FittingArguments, PairArguments};
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
@@ -78,9 +80,9 @@ pub struct TransferArguments {
     /// Folder for the results
     #[arg(long, value_name = "FOLDER", default_value = "dress-out")]
     pub out: PathBuf,
-    /// What becomes of the room between garment and body [default: absolute]
-    #[arg(long, value_name = "KIND")]
-    pub ease: Option<EaseKind>,
+    /// What the shape is to keep.
+    #[command(flatten)]
+    pub design: DesignArguments,
 }
 
 /// `dress check-gradient`.
@@ -409,13 +411,4 @@ mod tests {
             assert!(Arguments::try_parse_from(line.split_whitespace()).is_err());
         }
     }
-}
-
-/// [`dress_anyone::transfer::Ease`].
-#[derive(Clone, Copy, Debug, ValueEnum)]
-pub enum EaseKind {
-    /// Kept in metres
-    Absolute,
-    /// Grows with the body
-    Relative,
 }

@@ -1,6 +1,6 @@
 //! `dress transfer`.
 
-use crate::arguments::{EaseKind, TransferArguments};
+use crate::arguments::TransferArguments;
 use crate::correspond::How;
 use crate::failure::Failure;
 use crate::fitting::Inputs;
@@ -13,9 +13,7 @@ use crate::show::{Shown, contact_sheet};
 use anyhow::Context;
 use dress_anyone::io::output::Output;
 use dress_anyone::io::{body, garment_obj};
-use dress_anyone::problem::BadInput;
 use dress_anyone::refit::transfer::{Transfer, TransferReport, transfer};
-use dress_anyone::transfer::Ease;
 use serde::Serialize;
 use std::fmt::Write;
 use std::path::Path;
@@ -40,7 +38,7 @@ pub fn run(arguments: &TransferArguments) -> Result<String, Failure> {
     let mut progress = Progress::new(quiet);
     let inputs = Inputs::read(
         &arguments.pair,
-        params(arguments),
+        arguments.design.over(arguments.pair.reading.params()),
         Some(&arguments.out),
         &mut progress,
     )?;
@@ -68,17 +66,6 @@ pub fn run(arguments: &TransferArguments) -> Result<String, Failure> {
         "{garment}: carried from {from} to {to}\n{}Written to {out}\n",
         summary(&carried.report)
     ))
-}
-
-/// The parameters: the file's, overridden by the command line.
-fn params(arguments: &TransferArguments) -> Result<Params, BadInput> {
-    let mut params = arguments.pair.reading.params()?;
-    match arguments.ease {
-        Some(EaseKind::Absolute) => params.refit.transfer.ease = Ease::Absolute,
-        Some(EaseKind::Relative) => params.refit.transfer.ease = Ease::Relative,
-        None => {}
-    }
-    Ok(params)
 }
 
 /// All files of a transfer, in the unit and axes of the target body's.

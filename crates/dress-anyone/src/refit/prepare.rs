@@ -16,7 +16,7 @@ use crate::pattern::resample::resample;
 use crate::pattern::symmetry::Symmetry;
 use crate::pattern::triangulate;
 use crate::sim::{Assembly, Cloth, Scene};
-use crate::transfer::{Target, target_shape};
+use crate::transfer::{Layout, Target, target_shape};
 use std::sync::Arc;
 
 /// A mesh of less than this many times the coarse one's vertices is searched at once.
@@ -213,10 +213,10 @@ pub(super) fn carried(
     clock: &mut Clock,
     observe: &mut Observer<'_>,
 ) -> Result<(Vec<Vec3>, Target), RefitError> {
+    let layout = Layout::of(garment, &params.transfer).map_err(RefitError::Garment)?;
     let source_drape = on_source(garment, source, params, clock, observe)?;
     clock.stage("target shape", observe);
-    let outward = garment.mesh.outward_triangles();
-    let aim = target_shape(&source_drape, &outward, source, target, &params.transfer)?;
+    let aim = target_shape(&source_drape, &layout, source, target, &params.transfer)?;
     Ok((source_drape, aim))
 }
 

@@ -1,0 +1,198 @@
+//! What of a garment counts for its target shape besides its drape: lines that stay smooth, the ease of
+//! each zone, and parts that keep their size.
+
+use super::ease::{Ease, EaseAt};
+use super::{TransferParams, relax::Stencil};
+use crate::garment::Garment;
+use crate::pattern::Pattern;
+use crate::problem::Problem;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
+
+/// Panels with an ease of their own.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Zone {
+    /// Their names.
+    pub panels: Vec<String>,
+    /// What becomes of their distance to the body.
+    pub ease: Ease,
+}
+
+/// How a cloth is made up.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Layout {
+    /// Triangles of the welded cloth, right side in front.
+    pub triangles: Vec<[u32; 3]>,
+    /// Cloth vertices along seams, darts and rims, each line once.
+    pub lines: Vec<Vec<u32>>,
+    /// `[cloth vertex]`.
+    pub ease: Vec<EaseAt>,
+    /// Mesh edges that keep their length.
+    pub kept: Vec<[u32; 2]>,
+}
+
+/// Neighbours along a line, either way, in the stencil that keeps it smooth.
+const LINE_REACH: usize = 3;
+
+impl Layout {
+    /// A cloth without lines, all with the same ease.
+    pub fn plain(vertex_count: usize, triangles: Vec<[u32; 3]>, ease: Ease) -> Self {
+        Self {
+            triangles,
+            lines: Vec::new(),
+            ease: vec![ease.into(); vertex_count],
+            kept: Vec::new(),
+        }
+    }
+
+    /// Of a garment, with the zones and kept parts of `params`. All that they name must be there.
+    pub fn of(garment: &Garment, params: &TransferParams) -> Result<Self, Vec<Problem>> {
+        let mesh = &garment.mesh;
+        let mut names = Names {
+            pattern: &garment.pattern,
+            problems: Vec::new(),
+        };
+        let mut ease_of_panel = vec![EaseAt::from(params.ease); garment.pattern.panels.len()];
+        for zone in &params.zones {
+            for panel in &zone.panels {
+                if let Some(p) = names.panel(panel, "transfer.zones") {
+                    ease_of_panel[p] = zone.ease.into();
+                }
+            }
+        }
+        let mut kept = BTreeSet::new();
+        let mut keep = |a: u32, b: u32| {
+            let [a, b] = [a, b].map(|v| mesh.sewing[v as usize]);
+            kept.insert([a.min(b), a.max(b)]);
+        };
+        for panel in &params.keep {
+            if let Some(p) = names.panel(panel, "transfer.keep") {
+                for &[a, b, c] in &mesh.triangles[mesh.panel_triangles[p].clone()] {
+                    keep(a, b);
+                    keep(b, c);
+                    keep(c, a);
+                }
+            }
+        }
+        for edge in &params.keep_length {
+            for (p, e) in names.edges(edge) {
+                for pair in mesh.edge_vertices[p][e].windows(2) {
+                    keep(pair[0], pair[1]);
+                }
+            }
+        }
+        if !names.problems.is_empty() {
+            return Err(names.problems);
+        }
+        kept.retain(|[a, b]| a != b);
+        let mut at_vertex = vec![Vec::new(); mesh.cloth_vertex_count];
+        for (p, vertices) in mesh.panel_vertices.iter().enumerate() {
+            for v in vertices.clone() {
+                at_vertex[mesh.sewing[v] as usize].push(ease_of_panel[p]);
+            }
+        }
+        Ok(Self {
+            triangles: mesh.outward_triangles(),
+            lines: lines(garment),
+            ease: at_vertex.iter().map(|all| EaseAt::mean(all)).collect(),
+            kept: kept.into_iter().collect(),
+        })
+    }
+
+    /// Stencils that keep the lines smooth.
+    pub(super) fn line_stencils(&self) -> impl Iterator<Item = Stencil> {
+        let along = |line: &Vec<u32>| -> Vec<Stencil> {
+            let closed = line.len() > 3 && line.first() == line.last();
+            let line = &line[..line.len() - usize::from(closed)];
+            let at = |i: usize, step: isize| -> Option<u32> {
+                let j = i as isize + step;
+                let j = if closed {
+                    j.rem_euclid(line.len() as isize)
+                } else {
+                    j
+                };
+                line.get(usize::try_from(j).ok()?).copied()
+            };
+            let reach = LINE_REACH as isize;
+            let stencil = |i: usize| {
+                let steps = (-reach..=reach).filter(|step| *step != 0);
+                let around: Vec<u32> = steps.filter_map(|step| at(i, step)).collect();
+                let centre = line[i];
+                let distinct = around.iter().all(|v| *v != centre);
+                (around.len() > LINE_REACH && distinct).then_some(Stencil { centre, around })
+            };
+            (0..line.len()).filter_map(stencil).collect()
+        };
+        self.lines.iter().flat_map(along)
+    }
+}
+
+/// The pattern's edges in cloth vertices; of two that are sewn together, one.
+fn lines(garment: &Garment) -> Vec<Vec<u32>> {
+    let mesh = &garment.mesh;
+    let mut seen = BTreeSet::new();
+    let edges = mesh.edge_vertices.iter().flatten();
+    edges
+        .map(|edge| -> Vec<u32> { edge.iter().map(|v| mesh.sewing[*v as usize]).collect() })
+        .filter(|line| {
+            let back: Vec<u32> = line.iter().rev().copied().collect();
+            seen.insert(back.min(line.clone()))
+        })
+        .collect()
+}
+
+/// Looks names up, and notes those that are not there.
+struct Names<'a> {
+    pattern: &'a Pattern,
+    problems: Vec<Problem>,
+}
+
+impl Names<'_> {
+    fn panel(&mut self, name: &str, place: &str) -> Option<usize> {
+        let found = self.pattern.panel_named(name);
+        if found.is_none() {
+            let names: Vec<String> = (self.pattern.panels.iter())
+                .map(|panel| format!("`{}`", panel.name))
+                .collect();
+            self.problems.push(Problem::at(
+                place,
+                format!(
+                    "there is no panel `{name}`; there are {}",
+                    names.join(", ")
+                ),
+            ));
+        }
+        found
+    }
+
+    /// The edges behind "PANEL:EDGE", where EDGE is a number or a label.
+    fn edges(&mut self, text: &str) -> Vec<(usize, usize)> {
+        let place = "transfer.keep_length";
+        let Some((panel, edge)) = text.rsplit_once(':') else {
+            let text = format!("`{text}` must be a panel and an edge, as in `front:2`");
+            self.problems.push(Problem::at(place, text));
+            return Vec::new();
+        };
+        let Some(p) = self.panel(panel, place) else {
+            return Vec::new();
+        };
+        let edges = &self.pattern.panels[p].edges;
+        let numbered = edge.parse::<usize>().ok();
+        let found: Vec<(usize, usize)> = (0..edges.len())
+            .filter(|&e| numbered == Some(e) || edges[e].label.as_deref() == Some(edge))
+            .map(|e| (p, e))
+            .collect();
+        if found.is_empty() {
+            self.problems.push(Problem::at(
+                format!("{place}, panel `{panel}`"),
+                format!(
+                    "there is no edge `{edge}`; edges are 0 to {}, or have one of the labels that \
+                     `dress inspect` tells",
+                    edges.len().saturating_sub(1)
+                ),
+            ));
+        }
+        found
+    }
+}
