@@ -18,15 +18,18 @@ mod ease;
 mod hold;
 mod layers;
 mod layout;
+mod paint;
 mod relax;
+mod room;
 
 use crate::body::Body;
 use crate::geometry::mesh::{bounds, vertex_normals};
 use crate::geometry::{ClosestPoint, Vec3};
 use bind::{BodyMap, Carried, smoothstep};
-use clear::{Clearing, at_distance};
+use clear::{Clearing, at_distance, belongs};
 pub use ease::{Ease, EaseAt};
 pub use layout::{Layout, Zone};
+pub use paint::Paint;
 use rayon::prelude::*;
 use relax::{Relaxation, rings};
 use serde::{Deserialize, Serialize};
@@ -124,7 +127,7 @@ const STEP: f64 = 3e-4;
 /// Times that a garment which met the body is relaxed again, to even out what was pushed.
 const SMOOTHINGS: usize = 2;
 /// Error of a relaxed vertex, as part of how far one may still move when the loop ends.
-const EXACT: f64 = 1e-4;
+const EXACT: f64 = 1e-2;
 
 /// Carries a drape from `source` to `target`, two bodies of one topology.
 ///
@@ -163,9 +166,7 @@ pub fn target_shape(
         relaxation: Relaxation::new(drape, &stencils, holds, &layout.kept),
         body: &on_target,
         bound: &bound,
-        wanted: (distance.iter().zip(&bound))
-            .map(|(distance, carried)| distance * carried.ease)
-            .collect(),
+        wanted: room::wanted(drape, &distance, &bound, [&on_source, &on_target]),
         trust: (distance.iter())
             .map(|d| 1.0 - smoothstep((d / height - CLOSE.0) / (CLOSE.1 - CLOSE.0)))
             .collect(),
@@ -173,7 +174,14 @@ pub fn target_shape(
         rounds: params.iterations,
     };
     let step = STEP * height;
-    let clearing = Clearing::new(&on_target, &target.mesh, triangles, &rings, step);
+    // Cloth that was in another part's half already may stay there.
+    let home = |(carried, x): (&Carried, &Vec3)| {
+        let [before, after] = carried.normals;
+        let home = belongs(&on_source, *x, before);
+        if home { after } else { Vec3::zeros() }
+    };
+    let homes = bound.iter().zip(drape).map(home).collect();
+    let clearing = Clearing::new(&on_target, &target.mesh, triangles, &rings, homes, step);
     let mut least: Vec<f64> = (settling.wanted.iter())
         .map(|wanted| wanted.clamp(0.0, params.thickness))
         .collect();

@@ -6,6 +6,7 @@ pub mod fitting;
 use crate::body::arguments::BodyCommand;
 use crate::params::{self, Params};
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use design::DesignArguments;
 use dress_anyone::body::UpAxis;
 use dress_anyone::io::body::BodyOptions;
 use dress_anyone::io::garment::GarmentOptions;
@@ -13,7 +14,6 @@ use dress_anyone::io::garment_obj::UvOptions;
 use dress_anyone::io::garmentcode::RotationOrder;
 use dress_anyone::problem::BadInput;
 use dress_anyone::sim::Solver;
-use design::DesignArguments;
 use fitting::{FittingArguments, PairArguments};
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
@@ -83,6 +83,10 @@ pub struct TransferArguments {
     /// What the shape is to keep.
     #[command(flatten)]
     pub design: DesignArguments,
+    /// Ease painted on the drape: an OBJ with vertex colours, black for absolute, white for relative, in
+    /// place of --ease
+    #[arg(long, value_name = "FILE", conflicts_with = "ease")]
+    pub ease_paint: Option<PathBuf>,
 }
 
 /// `dress check-gradient`.

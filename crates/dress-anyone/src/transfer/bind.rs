@@ -265,8 +265,8 @@ pub(super) fn smoothstep(t: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
     use super::super::ease::Ease;
+    use super::*;
     use crate::check::noise;
     use crate::geometry::closest_point::tests::sphere;
 

@@ -15,7 +15,7 @@ use crate::geometry::Vec3;
 /// Share of the body's height beyond which cloth hangs: 6 cm on an adult.
 const HANGING: f64 = 0.035;
 /// ℓ across, of hanging cloth, as share of the body's height.
-const LOOSE: f64 = 0.05;
+const LOOSE: f64 = 0.12;
 /// Rims this close, as share of the body's height, grip it: waistbands, cuffs, collars. 1.5 cm.
 const GRIP: f64 = 0.009;
 /// ℓ along, of a rim that hangs, as part of other cloth's.

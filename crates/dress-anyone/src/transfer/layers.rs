@@ -46,7 +46,12 @@ pub(super) fn stencils(
     };
     let stencil = |v: usize| {
         let mut around = rings[v].clone();
-        around.extend(layer(v).map(|t| triangles[t as usize]).into_iter().flatten());
+        around.extend(
+            layer(v)
+                .map(|t| triangles[t as usize])
+                .into_iter()
+                .flatten(),
+        );
         Stencil {
             centre: v as u32,
             around,

@@ -1,8 +1,9 @@
 //! What of a garment counts for its target shape besides its drape: lines that stay smooth, the ease of
 //! each zone, and parts that keep their size.
 
+use super::TransferParams;
 use super::ease::{Ease, EaseAt};
-use super::{TransferParams, relax::Stencil};
+use super::relax::Stencil;
 use crate::garment::Garment;
 use crate::pattern::Pattern;
 use crate::problem::Problem;
@@ -157,10 +158,7 @@ impl Names<'_> {
                 .collect();
             self.problems.push(Problem::at(
                 place,
-                format!(
-                    "there is no panel `{name}`; there are {}",
-                    names.join(", ")
-                ),
+                format!("there is no panel `{name}`; there are {}", names.join(", ")),
             ));
         }
         found
@@ -194,5 +192,83 @@ impl Names<'_> {
             ));
         }
         found
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixture::{rectangle, stitch};
+    use crate::pattern::triangulate;
+
+    /// A front and a back, sewn along one side.
+    fn garment() -> Garment {
+        let mut pattern = Pattern {
+            panels: vec![rectangle("front", 0.2, 0.3), rectangle("back", 0.2, 0.3)],
+            stitches: vec![stitch((0, 1), (1, 3))],
+        };
+        pattern.panels[1].edges[0].label = Some("hem".to_owned());
+        let mesh = triangulate::mesh(&pattern, 0.05).expect("rectangles can be meshed");
+        Garment {
+            name: "bib".to_owned(),
+            pattern,
+            mesh,
+            drape: None,
+        }
+    }
+
+    #[test]
+    fn a_seam_is_one_line_and_has_the_mean_ease() {
+        let params = TransferParams {
+            ease: Ease::Absolute,
+            zones: vec![Zone {
+                panels: vec!["back".to_owned()],
+                ease: Ease::Relative,
+            }],
+            ..TransferParams::default()
+        };
+        let garment = garment();
+        let layout = Layout::of(&garment, &params).expect("all names are there");
+        // Four edges each, one shared.
+        assert_eq!(layout.lines.len(), 7);
+        let at = |panel: usize, edge: usize, k: usize| {
+            let v = garment.mesh.edge_vertices[panel][edge][k];
+            layout.ease[garment.mesh.sewing[v as usize] as usize].fixed
+        };
+        assert_eq!([at(0, 3, 1), at(0, 1, 1), at(1, 1, 1)], [0.0, 0.5, 1.0]);
+    }
+
+    #[test]
+    fn edges_are_kept_by_number_and_by_label() {
+        let count = |names: &[&str], panels: &[&str]| {
+            let owned = |names: &[&str]| names.iter().map(|s| (*s).to_owned()).collect();
+            let params = TransferParams {
+                keep: owned(panels),
+                keep_length: owned(names),
+                ..TransferParams::default()
+            };
+            Layout::of(&garment(), &params).map(|layout| layout.kept.len())
+        };
+        // 20 cm in pieces of 5 cm.
+        assert_eq!(count(&["back:hem"], &[]), Ok(4));
+        assert_eq!(count(&["back:0", "back:hem", "front:2"], &[]), Ok(8));
+        assert!(count(&[], &["front"]).is_ok_and(|count| count > 30));
+        let problems = count(&["back:7", "sleeve:0", "hem"], &["pocket"]).expect_err("wrong names");
+        assert_eq!(problems.len(), 4);
+    }
+
+    #[test]
+    fn a_line_knows_its_neighbours_and_a_ring_has_no_end() {
+        let stencils = |line: Vec<u32>| {
+            let mut layout = Layout::plain(10, Vec::new(), Ease::Auto);
+            layout.lines.push(line);
+            layout.line_stencils().map(|s| s.around).collect::<Vec<_>>()
+        };
+        let open = stencils(vec![0, 1, 2, 3, 4]);
+        // The ends have three neighbours only.
+        assert_eq!(open, [vec![0, 2, 3, 4], vec![0, 1, 3, 4], vec![0, 1, 2, 4]]);
+        let ring = stencils(vec![0, 1, 2, 3, 4, 5, 6, 0]);
+        assert_eq!(ring.len(), 7);
+        assert_eq!(ring[0], [4, 5, 6, 1, 2, 3]);
     }
 }
