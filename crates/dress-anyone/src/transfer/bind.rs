@@ -60,6 +60,8 @@ pub(super) struct Carried {
     pub(super) ease: f64,
     /// Unit outward directions of the source and the target body there; zero where there is none.
     pub(super) normals: [Vec3; 2],
+    /// How the space around it is turned and stretched.
+    pub(super) map: Mat3,
 }
 
 /// Patch width on the surface, as a share of the body's height: 2.5 cm on an adult. Narrower follows
@@ -125,6 +127,7 @@ impl BodyMap {
                 point: patch.iter().map(|(w, piece)| image(piece) * *w).sum(),
                 ease,
                 normals: [normal(0), normal(1)],
+                map: patch.iter().map(|(w, p)| p.deformation.at(ease) * *w).sum(),
             };
         }
     }

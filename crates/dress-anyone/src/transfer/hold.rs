@@ -112,6 +112,7 @@ mod tests {
             point: *p,
             ease: 1.0,
             normals: [Vec3::y(); 2],
+            map: crate::geometry::Mat3::identity(),
         };
         let bound: Vec<Carried> = x.iter().map(bound).collect();
         let distance = vec![0.0; x.len()];
@@ -123,7 +124,7 @@ mod tests {
         let stencils: Vec<Stencil> = rings.iter().enumerate().map(stencil).collect();
         let wave = |p: &Vec3| 1e-3 * (std::f64::consts::TAU * p.x / wavelength).cos();
         let z: Vec<Vec3> = x.iter().map(|p| p + Vec3::x() * wave(p)).collect();
-        let relaxed = Relaxation::new(&x, &stencils, holds, &[]).relax(&z, &x, 1e-9);
+        let relaxed = Relaxation::new(&x, &stencils, holds, &[], vec![]).relax(&z, &x, 1e-9);
         // By the crest in the middle, whose rim is far away.
         let middle = (0..x.len()).filter(|&v| {
             let p = x[v];

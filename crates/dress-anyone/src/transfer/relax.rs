@@ -3,8 +3,9 @@
 //!
 //! A stencil is a vertex c and its neighbours, E = [x_i − x_c] in the source drape. The projector
 //! W = I − Eᵀ(EEᵀ)†E is blind to affine images of it. The relaxed X minimises
-//! ½ Σ w/n ‖W [x_i − x_c]‖² + ½ Σ_v (x_v − z_v)ᵀM_v(x_v − z_v) + ½ k Σ ‖x_a − x_b − l d‖², the last over
-//! edges that keep their length l in the direction d that they have. M_v is stiffer along the body's
+//! ½ Σ w/n ‖W [x_i − x_c]‖² + ½ Σ_v (x_v − z_v)ᵀM_v(x_v − z_v) + ½ Σ k ‖x_v − Σ b_i x_i − o‖², the last over
+//! edges that keep their length in the direction that they have, and over layers that are tied to one
+//! another. M_v is stiffer along the body's
 //! normal than along the body, so the three coordinates are coupled; the scalar system with the mean of
 //! M_v, factored once, preconditions conjugate gradients for it.
 
@@ -27,6 +28,7 @@ pub(super) struct Relaxation {
     stiffness: SparseColMat<usize, f64>,
     holds: Vec<Hold>,
     kept: Vec<Kept>,
+    ties: Vec<Tie>,
 }
 
 /// A vertex and those whose layout around it is kept.
@@ -51,10 +53,20 @@ pub(super) struct Kept {
     pub(super) length: f64,
 }
 
+/// A vertex that stays at an offset \[m\] from a point of a triangle.
+pub(super) struct Tie {
+    pub(super) vertex: u32,
+    pub(super) triangle: [u32; 3],
+    pub(super) weights: [f64; 3],
+    pub(super) offset: Vec3,
+}
+
 /// Directions of a stencil below this share of its widest one are rounding.
 const FLAT: f64 = 1e-7;
 /// Stiffness of an edge that keeps its length \[–\]: far above what holds the vertices.
 const KEEP: f64 = 3.0;
+/// Stiffness of a tie \[–\]: firm beside what holds the vertices, soft beside the stencils.
+const TIE: f64 = 0.3;
 /// Most iterations of a solve; some thirty suffice.
 const ITERATIONS: usize = 300;
 
@@ -72,6 +84,7 @@ impl Relaxation {
         stencils: &[Stencil],
         holds: Vec<Hold>,
         kept: &[[u32; 2]],
+        ties: Vec<Tie>,
     ) -> Self {
         let kept: Vec<Kept> = (kept.iter())
             .map(|&ends| {
@@ -81,8 +94,8 @@ impl Relaxation {
             })
             .collect();
         let mean: Vec<f64> = holds.iter().map(|h| (h.across * h.along).sqrt()).collect();
-        let stiffness = system(x, stencils, &kept, &vec![0.0; x.len()]);
-        let system = system(x, stencils, &kept, &mean);
+        let stiffness = system(x, stencils, (&kept, &ties), &vec![0.0; x.len()]);
+        let system = system(x, stencils, (&kept, &ties), &mean);
         let symbolic = factorize_symbolic_cholesky(
             system.symbolic(),
             Side::Lower,
@@ -110,6 +123,7 @@ impl Relaxation {
             stiffness,
             holds,
             kept,
+            ties,
         }
     }
 
@@ -146,7 +160,7 @@ impl Relaxation {
         x
     }
 
-    /// M z, and what the kept edges ask for.
+    /// M z, and what kept edges and ties ask for.
     fn pulls(&self, z: &[Vec3], directions: &[Vec3]) -> Vec<Vec3> {
         let mut pulls: Vec<Vec3> = (self.holds.iter().zip(z))
             .map(|(hold, &z)| hold.times(z))
@@ -157,6 +171,11 @@ impl Relaxation {
             let wanted = edge.try_normalize(0.0).unwrap_or_else(Vec3::zeros) * kept.length;
             pulls[a] += wanted * KEEP;
             pulls[b] -= wanted * KEEP;
+        }
+        for tie in &self.ties {
+            for (v, weight) in tie.ends() {
+                pulls[v] += tie.offset * (TIE * weight);
+            }
         }
         pulls
     }
@@ -195,6 +214,15 @@ impl Relaxation {
     }
 }
 
+impl Tie {
+    /// Vertices and their weights in what is kept: 1, and minus those of the triangle.
+    fn ends(&self) -> [(usize, f64); 4] {
+        let [a, b, c] = self.triangle.map(|v| v as usize);
+        let [u, v, w] = self.weights.map(|weight| -weight);
+        [(self.vertex as usize, 1.0), (a, u), (b, v), (c, w)]
+    }
+}
+
 fn dot(a: &[Vec3], b: &[Vec3]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a.dot(b)).sum()
 }
@@ -211,12 +239,12 @@ pub(super) fn rings(vertex_count: usize, triangles: &[[u32; 3]]) -> Vec<Vec<u32>
     ascending.collect()
 }
 
-/// Lower triangle of Σ BᵀWB / n over the stencils, where (B X)_i = x_i − x_c, with kept edges, and
-/// `diagonal`.
+/// Lower triangle of Σ BᵀWB / n over the stencils, where (B X)_i = x_i − x_c, with kept edges and
+/// ties, and `diagonal`.
 fn system(
     x: &[Vec3],
     stencils: &[Stencil],
-    kept: &[Kept],
+    (kept, ties): (&[Kept], &[Tie]),
     diagonal: &[f64],
 ) -> SparseColMat<usize, f64> {
     let mut entries = Vec::new();
@@ -232,6 +260,13 @@ fn system(
         let [a, b] = kept.ends.map(|v| v as usize);
         for (row, col, sign) in [(a, a, 1.0), (b, b, 1.0), (a, b, -1.0), (b, a, -1.0)] {
             add(row, col, sign * KEEP);
+        }
+    }
+    for tie in ties {
+        for (row, first) in tie.ends() {
+            for (col, second) in tie.ends() {
+                add(row, col, TIE * first * second);
+            }
         }
     }
     for stencil in stencils {
@@ -328,7 +363,7 @@ mod tests {
         let (x, stencils) = bumpy();
         let stretch = Mat3::from_fn(|i, j| noise(3 * i + j) + f64::from(u8::from(i == j)));
         let image: Vec<Vec3> = x.iter().map(|p| stretch * p + Vec3::repeat(0.7)).collect();
-        let relaxation = Relaxation::new(&x, &stencils, holds(&x), &[]);
+        let relaxation = Relaxation::new(&x, &stencils, holds(&x), &[], vec![]);
         let forces = relaxation.times(&image);
         // Nothing but the holds: positions of the order of 1 m.
         for (force, (hold, image)) in forces.iter().zip(relaxation.holds.iter().zip(&image)) {
@@ -342,7 +377,7 @@ mod tests {
     #[test]
     fn the_relaxed_shape_solves_the_coupled_system() {
         let (x, stencils) = bumpy();
-        let relaxation = Relaxation::new(&x, &stencils, holds(&x), &[]);
+        let relaxation = Relaxation::new(&x, &stencils, holds(&x), &[], vec![]);
         let z: Vec<Vec3> = (x.iter().enumerate())
             .map(|(i, p)| p + Vec3::from_fn(|c, _| 0.02 * noise(3 * i + c)))
             .collect();
@@ -358,7 +393,7 @@ mod tests {
         let (x, stencils) = bumpy();
         let mut z = x.clone();
         z[50] *= 1.3;
-        let relaxed = Relaxation::new(&x, &stencils, holds(&x), &[]).relax(&z, &z, 1e-10);
+        let relaxed = Relaxation::new(&x, &stencils, holds(&x), &[], vec![]).relax(&z, &z, 1e-10);
         // Its own ring takes it for an affine image (on a sphere all neighbours lie equally deep);
         // those of its neighbours do not.
         assert!((relaxed[50] - x[50]).norm() < 0.6 * (z[50] - x[50]).norm());
@@ -370,7 +405,7 @@ mod tests {
         let edge = [stencils[50].centre, stencils[50].around[0]];
         let length = |x: &[Vec3]| (x[edge[0] as usize] - x[edge[1] as usize]).norm();
         let larger: Vec<Vec3> = x.iter().map(|p| p * 1.5).collect();
-        let relaxation = Relaxation::new(&x, &stencils, holds(&x), &[edge]);
+        let relaxation = Relaxation::new(&x, &stencils, holds(&x), &[edge], vec![]);
         let relaxed = relaxation.relax(&larger, &larger, 1e-10);
         // Holds of 0.1 against 3, and stencils that yield.
         assert!((length(&relaxed) / length(&x) - 1.0).abs() < 0.1);
@@ -386,7 +421,7 @@ mod tests {
             Vec3::z(),
         ];
         let stencils = stencils(rings(5, &[[0, 1, 2], [1, 3, 2]]));
-        let relaxed = Relaxation::new(&x, &stencils, holds(&x[1..2].repeat(5)), &[]);
+        let relaxed = Relaxation::new(&x, &stencils, holds(&x[1..2].repeat(5)), &[], vec![]);
         let relaxed = relaxed.relax(&x, &x, 1e-12);
         assert!(relaxed.iter().zip(&x).all(|(a, b)| (a - b).norm() < 1e-14));
     }

@@ -60,6 +60,7 @@ mod tests {
                 point: x,
                 ease: 1.0,
                 normals: [Vec3::x(); 2],
+                map: crate::geometry::Mat3::identity(),
             };
             wanted(&[x], &[distance], &[carried], [&walls(from), &walls(to)])[0]
         };
