@@ -229,7 +229,7 @@ mod tests {
         assert!(clearing.clear(&mut cloth.positions, &mut least));
         assert!(meet(&cloth.positions).is_empty());
         // Nothing goes farther than it must: an edge of 0.39 radians sags by 0.303 (1 − cos 0.2).
-        let farthest = cloth.positions.iter().map(|p| p.norm()).fold(0.0, f64::max);
+        let farthest = cloth.positions.iter().map(Vec3::norm).fold(0.0, f64::max);
         assert!(farthest < 0.303 + 0.03, "{farthest}");
     }
 

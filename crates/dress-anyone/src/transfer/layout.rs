@@ -106,19 +106,16 @@ impl Layout {
         let along = |line: &Vec<u32>| -> Vec<Stencil> {
             let closed = line.len() > 3 && line.first() == line.last();
             let line = &line[..line.len() - usize::from(closed)];
-            let at = |i: usize, step: isize| -> Option<u32> {
-                let j = i as isize + step;
-                let j = if closed {
-                    j.rem_euclid(line.len() as isize)
-                } else {
-                    j
-                };
-                line.get(usize::try_from(j).ok()?).copied()
+            // Places as if the line came three times, so that a ring has no end and a line has.
+            let at = |place: usize| -> Option<u32> {
+                let inside = (line.len()..2 * line.len()).contains(&place);
+                (closed || inside).then(|| line[place % line.len()])
             };
-            let reach = LINE_REACH as isize;
             let stencil = |i: usize| {
-                let steps = (-reach..=reach).filter(|step| *step != 0);
-                let around: Vec<u32> = steps.filter_map(|step| at(i, step)).collect();
+                let here = line.len() + i;
+                let (first, last) = (here.saturating_sub(LINE_REACH), here + LINE_REACH);
+                let others = (first..=last).filter(|place| *place != here);
+                let around: Vec<u32> = others.filter_map(at).collect();
                 let centre = line[i];
                 let distinct = around.iter().all(|v| *v != centre);
                 (around.len() > LINE_REACH && distinct).then_some(Stencil { centre, around })
