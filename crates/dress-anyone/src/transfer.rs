@@ -66,7 +66,7 @@ pub struct TransferParams {
 impl Default for TransferParams {
     fn default() -> Self {
         Self {
-            spacing: 0.012,
+            spacing: 0.02,
             place: 0.035,
             ease: Ease::Auto,
             zones: Vec::new(),
