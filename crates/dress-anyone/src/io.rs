@@ -11,6 +11,7 @@ pub mod kind;
 pub mod npz;
 pub mod obj;
 pub mod output;
+pub mod paint;
 mod ply;
 mod source;
 mod stl;

@@ -1,10 +1,12 @@
 //! The command line.
 
+pub mod design;
 pub mod fitting;
 
 use crate::body::arguments::BodyCommand;
 use crate::params::{self, Params};
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use design::DesignArguments;
 use dress_anyone::body::UpAxis;
 use dress_anyone::io::body::BodyOptions;
 use dress_anyone::io::garment::GarmentOptions;
@@ -78,9 +80,13 @@ pub struct TransferArguments {
     /// Folder for the results
     #[arg(long, value_name = "FOLDER", default_value = "dress-out")]
     pub out: PathBuf,
-    /// What becomes of the room between garment and body [default: absolute]
-    #[arg(long, value_name = "KIND")]
-    pub ease: Option<EaseKind>,
+    /// What the shape is to keep.
+    #[command(flatten)]
+    pub design: DesignArguments,
+    /// Ease painted on the drape: an OBJ with vertex colours, black for absolute, white for relative, in
+    /// place of --ease
+    #[arg(long, value_name = "FILE", conflicts_with = "ease")]
+    pub ease_paint: Option<PathBuf>,
 }
 
 /// `dress check-gradient`.
@@ -409,13 +415,4 @@ mod tests {
             assert!(Arguments::try_parse_from(line.split_whitespace()).is_err());
         }
     }
-}
-
-/// [`dress_anyone::transfer::Ease`].
-#[derive(Clone, Copy, Debug, ValueEnum)]
-pub enum EaseKind {
-    /// Kept in metres
-    Absolute,
-    /// Grows with the body
-    Relative,
 }

@@ -50,7 +50,7 @@ pub const TEMPLATE: &str = include_str!("params.toml");
 const LIMIT: u64 = MEBIBYTE;
 
 /// Numbers that must be above zero: others may be zero, and none is negative.
-const POSITIVE: [&str; 13] = [
+const POSITIVE: [&str; 14] = [
     "read.resolution",
     "fabric.warp",
     "fabric.weft",
@@ -62,7 +62,8 @@ const POSITIVE: [&str; 13] = [
     "sim.step.dt",
     "sim.step.speed",
     "sim.equilibrium.step",
-    "transfer.tightness",
+    "transfer.spacing",
+    "transfer.place",
     "descent.step",
 ];
 

@@ -21,7 +21,7 @@ use dress_anyone::io::{body, garment_obj, garmentcode, obj, svg};
 use dress_anyone::refit::dress::drape_on;
 use dress_anyone::refit::{self, Given, Refit, RefitError, accept, refit_from};
 use dress_anyone::report::Report;
-use dress_anyone::transfer::target_shape;
+use dress_anyone::transfer::{Layout, target_shape};
 use serde::Serialize;
 use std::path::Path;
 use std::sync::atomic::Ordering;
@@ -141,10 +141,10 @@ fn in_own_pose(
         ..inputs.target.clone()
     };
     let params = &inputs.params.refit;
-    let outward = garment.mesh.outward_triangles();
+    let layout = Layout::of(garment, &params.transfer).map_err(RefitError::Garment)?;
     let carried = target_shape(
         &refitted.x,
-        &outward,
+        &layout,
         &inputs.target,
         &body,
         &params.transfer,

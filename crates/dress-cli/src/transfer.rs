@@ -1,6 +1,6 @@
 //! `dress transfer`.
 
-use crate::arguments::{EaseKind, TransferArguments};
+use crate::arguments::TransferArguments;
 use crate::correspond::How;
 use crate::failure::Failure;
 use crate::fitting::Inputs;
@@ -12,10 +12,9 @@ use crate::refit::json;
 use crate::show::{Shown, contact_sheet};
 use anyhow::Context;
 use dress_anyone::io::output::Output;
-use dress_anyone::io::{body, garment_obj};
-use dress_anyone::problem::BadInput;
+use dress_anyone::io::{body, garment_obj, paint};
 use dress_anyone::refit::transfer::{Transfer, TransferReport, transfer};
-use dress_anyone::transfer::Ease;
+use dress_anyone::transfer::Paint;
 use serde::Serialize;
 use std::fmt::Write;
 use std::path::Path;
@@ -40,15 +39,22 @@ pub fn run(arguments: &TransferArguments) -> Result<String, Failure> {
     let mut progress = Progress::new(quiet);
     let inputs = Inputs::read(
         &arguments.pair,
-        params(arguments),
+        arguments.design.over(arguments.pair.reading.params()),
         Some(&arguments.out),
         &mut progress,
     )?;
+    let paint = match &arguments.ease_paint {
+        Some(file) => {
+            let (points, kappa) = paint::read(file)?;
+            Some(Paint { points, kappa })
+        }
+        None => None,
+    };
     let stop = stop_on_ctrl_c().context("Ctrl-C cannot be listened to")?;
     let carried = transfer(
         &inputs.loaded.garment,
-        &inputs.source,
-        &inputs.target,
+        paint.as_ref(),
+        [&inputs.source, &inputs.target],
         &inputs.params.refit,
         &mut |event| {
             progress.event(event);
@@ -68,17 +74,6 @@ pub fn run(arguments: &TransferArguments) -> Result<String, Failure> {
         "{garment}: carried from {from} to {to}\n{}Written to {out}\n",
         summary(&carried.report)
     ))
-}
-
-/// The parameters: the file's, overridden by the command line.
-fn params(arguments: &TransferArguments) -> Result<Params, BadInput> {
-    let mut params = arguments.pair.reading.params()?;
-    match arguments.ease {
-        Some(EaseKind::Absolute) => params.refit.transfer.ease = Ease::Absolute,
-        Some(EaseKind::Relative) => params.refit.transfer.ease = Ease::Relative,
-        None => {}
-    }
-    Ok(params)
 }
 
 /// All files of a transfer, in the unit and axes of the target body's.
@@ -142,15 +137,32 @@ fn summary(report: &TransferReport) -> String {
         ),
     );
     line("turned over", format!("{} triangles", report.turned_over));
-    let [before, after] = report.turning.map(f64::to_degrees);
-    line(
-        "seams and rims",
-        format!("turn by {after:.1} degrees from edge to edge (before: {before:.1})"),
-    );
+    let [seams, rims] = [report.seam_curvature, report.rim_curvature]
+        .map(|[before, after]| format!("{after:.1} (before: {before:.1})"));
+    line("curvature [1/m]", format!("seams {seams}, rims {rims}"));
+    if report.kept > 0.0 {
+        line("kept lengths", format!("within {:.1} %", 1e2 * report.kept));
+    }
     let [before, after] = report.asymmetry.map(|metres| 1e3 * metres);
     line(
         "mirrored panels",
         format!("{after:.1} mm apart at most (before: {before:.1})"),
+    );
+    let seconds: f64 = (report.stages.iter())
+        .filter(|stage| stage.stage == "target shape")
+        .map(|stage| stage.seconds)
+        .sum();
+    line(
+        "rounds",
+        format!(
+            "{}{}, {seconds:.1} s",
+            report.iterations,
+            if report.converged {
+                ""
+            } else {
+                ", not converged"
+            }
+        ),
     );
     let _ = writeln!(
         text,

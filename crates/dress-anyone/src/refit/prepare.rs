@@ -16,7 +16,7 @@ use crate::pattern::resample::resample;
 use crate::pattern::symmetry::Symmetry;
 use crate::pattern::triangulate;
 use crate::sim::{Assembly, Cloth, Scene};
-use crate::transfer::{Target, target_shape};
+use crate::transfer::{Layout, target_shape};
 use std::sync::Arc;
 
 /// A mesh of less than this many times the coarse one's vertices is searched at once.
@@ -57,11 +57,13 @@ impl<'a> Prepared<'a> {
             return Err(RefitError::Garment(problems));
         }
         let mesh = &garment.mesh;
-        let bodies = [source, target];
         let (source_drape, x_star) = if let Some(x_star) = x_star {
             (on_source(garment, source, params, clock, observe)?, x_star)
         } else {
-            let (source_drape, aim) = carried(garment, bodies, params, clock, observe)?;
+            let layout = Layout::of(garment, &params.transfer).map_err(RefitError::Garment)?;
+            let source_drape = on_source(garment, source, params, clock, observe)?;
+            clock.stage("target shape", observe);
+            let aim = target_shape(&source_drape, &layout, source, target, &params.transfer)?;
             (source_drape, aim.x_star)
         };
 
@@ -191,7 +193,7 @@ impl<'a> Prepared<'a> {
 }
 
 /// The garment on the source body \[m\]: as its file has it, or from the placed panels.
-fn on_source(
+pub(super) fn on_source(
     garment: &Garment,
     source: &Body,
     params: &RefitParams,
@@ -203,21 +205,6 @@ fn on_source(
         Some(x) => Ok(x.clone()),
         None => drape_to_rest(garment, source, params, observe),
     }
-}
-
-/// The garment on the source body, and the shape to aim for on the target (§4.2).
-pub(super) fn carried(
-    garment: &Garment,
-    [source, target]: [&Body; 2],
-    params: &RefitParams,
-    clock: &mut Clock,
-    observe: &mut Observer<'_>,
-) -> Result<(Vec<Vec3>, Target), RefitError> {
-    let source_drape = on_source(garment, source, params, clock, observe)?;
-    clock.stage("target shape", observe);
-    let outward = garment.mesh.outward_triangles();
-    let aim = target_shape(&source_drape, &outward, source, target, &params.transfer)?;
-    Ok((source_drape, aim))
 }
 
 /// The uniform scale of the initial guess (§4.6, corrected): √ of the growth of the cloth's area

@@ -1,15 +1,15 @@
 //! The target shape alone (paper §4.2), and how to judge it: whether the garment sits on the new body
 //! as it sat on the old one. No pattern, no simulation but for the source drape.
 
-use super::prepare::carried;
+mod judge;
+
+use super::prepare::on_source;
 use super::{Clock, Observer, RefitError, RefitParams};
 use crate::body::Body;
 use crate::garment::Garment;
-use crate::geometry::{ClosestPoint, Vec2, Vec3, intersections};
-use crate::pattern::PatternMesh;
-use crate::pattern::symmetry::Symmetry;
+use crate::geometry::{ClosestPoint, Vec3, intersections};
 use crate::report::StageTime;
-use crate::sim::energy::membrane::RestTriangle;
+use crate::transfer::{Layout, Paint, target_shape};
 use serde::Serialize;
 
 /// A garment carried to another body.
@@ -35,14 +35,18 @@ pub struct TransferReport {
     /// Stretch of x* over the source drape: of every triangle the smaller and the larger principal
     /// one \[–\].
     pub stretch: [Spread; 2],
-    /// Triangles that look the other way from the body than they did.
+    /// Triangles that are turned over against their surroundings.
     pub turned_over: usize,
     /// Pairs of a cloth triangle and a triangle of the target body that intersect.
     pub through_body: usize,
     /// Pairs of cloth triangles that intersect and share no vertex, before and after.
     pub through_itself: [usize; 2],
-    /// Mean turn of the cloth's seams and rims from mesh edge to mesh edge \[rad\], before and after.
-    pub turning: [f64; 2],
+    /// Mean curvature of the cloth's seams \[1/m\], before and after.
+    pub seam_curvature: [f64; 2],
+    /// Mean curvature of its rims \[1/m\].
+    pub rim_curvature: [f64; 2],
+    /// Largest change of an edge that was to keep its length \[–\]; zero where none was.
+    pub kept: f64,
     /// Farthest a vertex of a mirrored panel is from the mirror image of its partner \[m\], before and
     /// after; zero where nothing is mirrored.
     pub asymmetry: [f64; 2],
@@ -59,7 +63,15 @@ pub struct Spacing {
     pub before: Spread,
     /// On the target body.
     pub after: Spread,
+    /// Vertices by their distance to the source body: below 0, below 3 mm, and so on, the last beyond
+    /// all of [`BINS`].
+    pub histogram_before: Vec<usize>,
+    /// The same on the target body.
+    pub histogram_after: Vec<usize>,
 }
+
+/// Where the bins of distances to the body end \[m\].
+pub const BINS: [f64; 8] = [0.0, 3e-3, 6e-3, 0.01, 0.02, 0.03, 0.05, 0.1];
 
 /// How numbers are spread.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -94,142 +106,52 @@ impl Spread {
     }
 }
 
-/// Carries the garment's drape on `source`, made if it brought none, to `target`.
+/// Carries the garment's drape on `source`, made if it brought none, to `target`; with the ease that is
+/// painted on the drape, if some is.
 pub fn transfer(
     garment: &Garment,
-    source: &Body,
-    target: &Body,
+    paint: Option<&Paint>,
+    [source, target]: [&Body; 2],
     params: &RefitParams,
     observe: &mut Observer<'_>,
 ) -> Result<Transfer, RefitError> {
     let mut clock = Clock::new();
-    let (source_drape, aim) = carried(garment, [source, target], params, &mut clock, observe)?;
-    clock.stage("done", observe);
-    let mesh = &garment.mesh;
-    let triangles = mesh.outward_triangles();
+    let mut layout = Layout::of(garment, &params.transfer).map_err(RefitError::Garment)?;
+    let source_drape = on_source(garment, source, params, &mut clock, observe)?;
+    if let Some(paint) = paint {
+        let painted = paint.onto(&source_drape);
+        layout.ease = painted.map_err(|problem| RefitError::Garment(vec![problem]))?;
+    }
+    clock.stage("target shape", observe);
+    let aim = target_shape(&source_drape, &layout, source, target, &params.transfer)?;
+    clock.stage("report", observe);
+    let triangles = &layout.triangles;
     let both = [&source_drape, &aim.x_star];
     let bodies = [source, target].map(|body| ClosestPoint::new(&body.mesh));
     let skin = &target.mesh;
-    let through_itself = both.map(|x| intersections::within(x, &triangles).len());
+    let through_itself = both.map(|x| intersections::within(x, triangles).len());
     let through_body =
-        intersections::between(&aim.x_star, &triangles, &skin.positions, &skin.triangles).len();
-    let report = TransferReport {
+        intersections::between(&aim.x_star, triangles, &skin.positions, &skin.triangles).len();
+    let curvature = |rims: bool| both.map(|x| judge::curvature(garment, x, rims));
+    let mut report = TransferReport {
         iterations: aim.iterations,
         converged: aim.converged,
-        spacing: spacing(garment, both, &bodies),
-        stretch: stretch(&triangles, both),
-        turned_over: turned_over(&triangles, both, &bodies),
+        spacing: judge::spacing(garment, both, &bodies),
+        stretch: judge::stretch(triangles, both),
+        turned_over: judge::turned_over(triangles, both),
         through_body,
         through_itself,
-        turning: both.map(|x| turning(mesh, x)),
-        asymmetry: both.map(|x| asymmetry(garment, &source_drape, x)),
-        stages: clock.stages,
+        seam_curvature: curvature(false),
+        rim_curvature: curvature(true),
+        kept: judge::kept(&layout.kept, both),
+        asymmetry: both.map(|x| judge::asymmetry(garment, &source_drape, x)),
+        stages: Vec::new(),
     };
+    clock.stage("done", observe);
+    report.stages = clock.stages;
     Ok(Transfer {
         source_drape,
         x_star: aim.x_star,
         report,
     })
-}
-
-/// Distances to the bodies by panel.
-fn spacing(garment: &Garment, x: [&Vec<Vec3>; 2], bodies: &[ClosestPoint; 2]) -> Vec<Spacing> {
-    let mesh = &garment.mesh;
-    let panels = garment.pattern.panels.iter().zip(&mesh.panel_vertices);
-    panels
-        .map(|(panel, vertices)| {
-            let on = |k: usize| {
-                let at = |v: usize| x[k][mesh.sewing[v] as usize];
-                Spread::of(
-                    vertices
-                        .clone()
-                        .map(|v| bodies[k].signed_distance(at(v)))
-                        .collect(),
-                )
-            };
-            Spacing {
-                panel: panel.name.clone(),
-                before: on(0),
-                after: on(1),
-            }
-        })
-        .collect()
-}
-
-/// Principal stretches of the second shape over the first.
-fn stretch(triangles: &[[u32; 3]], [before, after]: [&Vec<Vec3>; 2]) -> [Spread; 2] {
-    let (mut least, mut most) = (Vec::new(), Vec::new());
-    for t in triangles {
-        let rest = RestTriangle::new(laid_flat(t.map(|v| before[v as usize])));
-        if !(rest.area > 0.0) {
-            continue;
-        }
-        let f = rest.gradient_of(t.map(|v| after[v as usize]));
-        let [low, high] = super::measure::principal_stretches(&f);
-        least.push(low);
-        most.push(high);
-    }
-    [Spread::of(least), Spread::of(most)]
-}
-
-/// A triangle in its own plane.
-fn laid_flat([a, b, c]: [Vec3; 3]) -> [Vec2; 3] {
-    let along = (b - a).try_normalize(0.0).unwrap_or_else(Vec3::x);
-    let side = c - a;
-    let x = along.dot(&side);
-    let y = (side - along * x).norm();
-    [
-        Vec2::zeros(),
-        Vec2::new((b - a).norm(), 0.0),
-        Vec2::new(x, y),
-    ]
-}
-
-/// Triangles whose side towards the body changed.
-fn turned_over(triangles: &[[u32; 3]], x: [&Vec<Vec3>; 2], bodies: &[ClosestPoint; 2]) -> usize {
-    let faces_out = |t: &[u32; 3], k: usize| {
-        let corners = t.map(|v| x[k][v as usize]);
-        let middle = (corners[0] + corners[1] + corners[2]) / 3.0;
-        let foot = bodies[k].query(middle, f64::INFINITY)?;
-        let away = bodies[k].pseudonormal(&foot);
-        let normal = (corners[1] - corners[0]).cross(&(corners[2] - corners[0]));
-        Some(normal.dot(&away) > 0.0)
-    };
-    let turned = |t: &&[u32; 3]| faces_out(t, 0) != faces_out(t, 1);
-    triangles.iter().filter(turned).count()
-}
-
-/// Mean angle between neighbouring mesh edges along the pattern's edges \[rad\].
-fn turning(mesh: &PatternMesh, x: &[Vec3]) -> f64 {
-    let (mut sum, mut count) = (0.0, 0);
-    for edge in mesh.edge_vertices.iter().flatten() {
-        let points: Vec<Vec3> = edge
-            .iter()
-            .map(|v| x[mesh.sewing[*v as usize] as usize])
-            .collect();
-        for p in points.windows(3) {
-            sum += (p[1] - p[0]).angle(&(p[2] - p[1]));
-            count += 1;
-        }
-    }
-    sum / f64::from(count.max(1))
-}
-
-/// Farthest a vertex is from the mirror image of its partner \[m\].
-fn asymmetry(garment: &Garment, source_drape: &[Vec3], x: &[Vec3]) -> f64 {
-    let mesh = &garment.mesh;
-    let symmetry = Symmetry::detect(&garment.pattern, mesh, Some(source_drape));
-    let mut worst = 0.0_f64;
-    for mirror in &symmetry.mirrors {
-        let Some(partners) = mirror.vertices(mesh) else {
-            continue;
-        };
-        let first = mesh.panel_vertices[mirror.panels[0]].clone();
-        for (v, w) in first.zip(partners) {
-            let [p, q] = [v, w as usize].map(|v| x[mesh.sewing[v] as usize]);
-            let image = Vec3::new(2.0 * symmetry.plane - p.x, p.y, p.z);
-            worst = worst.max((image - q).norm());
-        }
-    }
-    worst
 }

@@ -6,8 +6,10 @@
 //! vary smoothly with x, so that the map has no seam between two legs.
 //!
 //! F_k is how the surface around triangle k deforms, averaged over a few centimetres along the body:
-//! along the surface its stretch, across it rotation times g^κ (g: the size ratio of the patch).
+//! along the surface its stretch, across it rotation times what becomes of the ease, e(g), where g is
+//! the size ratio of the body there ([`super::ease`]).
 
+use super::ease::EaseAt;
 use crate::geometry::bvh::Bvh;
 use crate::geometry::{Mat3, TriangleMesh, Vec3};
 
@@ -24,10 +26,16 @@ pub(super) struct BodyMap {
 struct Piece {
     area: f64,
     centres: [Vec3; 2],
-    normal: Vec3,
-    deformation: Mat3,
-    /// g^κ.
-    ease: f64,
+    normals: [Vec3; 2],
+    deformation: Deformation,
+}
+
+/// How a patch deforms: `along` + e · `across`, where e is what becomes of distances across it.
+struct Deformation {
+    along: Mat3,
+    across: Mat3,
+    /// ln g.
+    growth: f64,
 }
 
 /// Second moments of a patch's edges, from which its deformation is fitted.
@@ -48,8 +56,12 @@ struct Moments {
 pub(super) struct Carried {
     /// Its place around the target body \[m\].
     pub(super) point: Vec3,
-    /// Factor of its distance to the body, g^κ \[–\].
+    /// Factor of its distance to the body \[–\].
     pub(super) ease: f64,
+    /// Unit outward directions of the source and the target body there; zero where there is none.
+    pub(super) normals: [Vec3; 2],
+    /// How the space around it is turned and stretched.
+    pub(super) map: Mat3,
 }
 
 /// Patch width on the surface, as a share of the body's height: 2.5 cm on an adult. Narrower follows
@@ -63,8 +75,7 @@ const THIN: f64 = 0.02;
 const AVERTED: f64 = 1e-6;
 
 impl BodyMap {
-    /// `kappa`: see [`super::Ease::kappa`].
-    pub(super) fn new(source: &TriangleMesh, target: &TriangleMesh, kappa: f64) -> Self {
+    pub(super) fn new(source: &TriangleMesh, target: &TriangleMesh) -> Self {
         let corners = |mesh: &TriangleMesh| -> Vec<[Vec3; 3]> {
             (0..mesh.triangles.len()).map(|t| mesh.corners(t)).collect()
         };
@@ -80,13 +91,11 @@ impl BodyMap {
         let tree = Bvh::new(&before);
         let piece = |&t: &u32| {
             let both = [before[t as usize], after[t as usize]];
-            let (deformation, ease) = moments[t as usize].deformation(kappa);
             Piece {
                 area: area(both[0]),
                 centres: both.map(|[a, b, c]| (a + b + c) / 3.0),
-                normal: unit_normal(both[0]),
-                deformation,
-                ease,
+                normals: both.map(unit_normal),
+                deformation: moments[t as usize].deformation(),
             }
         };
         let pieces = tree.order().iter().map(piece).collect();
@@ -99,18 +108,27 @@ impl BodyMap {
 
     /// Carries the point `x` of a cloth that looks along `outward` and is `distance` \[m\] away from
     /// the source body.
-    pub(super) fn carry(&self, x: Vec3, outward: Vec3, distance: f64) -> Carried {
+    pub(super) fn carry(&self, x: Vec3, outward: Vec3, distance: f64, ease: EaseAt) -> Carried {
         let mut width = self.width + SPREAD * distance.abs();
         loop {
             let patch = self.patch(x, outward, distance.abs(), width);
-            if !patch.is_empty() {
-                let image = |p: &Piece| p.centres[1] + p.deformation * (x - p.centres[0]);
-                return Carried {
-                    point: patch.iter().map(|(w, piece)| image(piece) * *w).sum(),
-                    ease: patch.iter().map(|(w, piece)| piece.ease * w).sum(),
-                };
+            if patch.is_empty() {
+                width *= 2.0;
+                continue;
             }
-            width *= 2.0;
+            let growth: f64 = patch.iter().map(|(w, p)| p.deformation.growth * w).sum();
+            let ease = ease.factor(growth);
+            let image = |p: &Piece| p.centres[1] + p.deformation.at(ease) * (x - p.centres[0]);
+            let normal = |k: usize| {
+                let sum: Vec3 = patch.iter().map(|(w, piece)| piece.normals[k] * *w).sum();
+                sum.try_normalize(1e-9).unwrap_or_else(Vec3::zeros)
+            };
+            return Carried {
+                point: patch.iter().map(|(w, piece)| image(piece) * *w).sum(),
+                ease,
+                normals: [normal(0), normal(1)],
+                map: patch.iter().map(|(w, p)| p.deformation.at(ease) * *w).sum(),
+            };
         }
     }
 
@@ -120,7 +138,7 @@ impl BodyMap {
         let mut patch = Vec::new();
         self.tree.nearest(x, squared_radius, |place, bound| {
             let piece = &self.pieces[place];
-            let (offset, normal) = (x - piece.centres[0], piece.normal);
+            let (offset, normal) = (x - piece.centres[0], piece.normals[0]);
             let nearness = 1.0 - offset.norm_squared() / squared_radius;
             if nearness > 0.0 && piece.area > 0.0 {
                 let above = smoothstep(0.5 + offset.dot(&normal) / self.width);
@@ -196,23 +214,33 @@ impl Moments {
         self.turn += other.turn * weight;
     }
 
-    /// F = A + (M − A S)(S + ε tr S)⁻¹, A = g^κ R: the stretch M S⁻¹ where the patch extends, A
-    /// across; and g^κ.
-    fn deformation(&self, kappa: f64) -> (Mat3, f64) {
+    /// F = e R + (M − e R S) Q, Q = (S + ε tr S)⁻¹: the stretch M S⁻¹ where the patch extends, e R
+    /// across.
+    fn deformation(&self) -> Deformation {
         let size = self.spread.trace();
         let growth = (self.size_after / size).sqrt();
         if !(growth.is_finite() && growth > 0.0) {
-            return (Mat3::identity(), 1.0);
+            return Deformation {
+                along: Mat3::zeros(),
+                across: Mat3::identity(),
+                growth: 0.0,
+            };
         }
-        let ease = growth.powf(kappa);
-        let across = rotation_of(self.map / growth + self.turn) * ease;
+        let rotation = rotation_of(self.map / growth + self.turn);
         let resistance = self.spread + Mat3::identity() * (THIN * size);
-        let along = resistance
-            .try_inverse()
-            .map_or_else(Mat3::zeros, |inverse| {
-                (self.map - across * self.spread) * inverse
-            });
-        (across + along, ease)
+        let inverse = resistance.try_inverse().unwrap_or_else(Mat3::zeros);
+        Deformation {
+            along: self.map * inverse,
+            across: rotation * (Mat3::identity() - self.spread * inverse),
+            growth: growth.ln(),
+        }
+    }
+}
+
+impl Deformation {
+    /// F, where distances across the surface change by the factor `ease`.
+    fn at(&self, ease: f64) -> Mat3 {
+        self.along + self.across * ease
     }
 }
 
@@ -240,6 +268,7 @@ pub(super) fn smoothstep(t: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use super::super::ease::Ease;
     use super::*;
     use crate::check::noise;
     use crate::geometry::closest_point::tests::sphere;
@@ -268,17 +297,17 @@ mod tests {
     fn a_similarity_of_the_body_is_a_similarity_of_the_space_around() {
         let body = sphere(0.3, 3);
         let turn = nalgebra::Rotation3::from_euler_angles(0.3, 2.0, -0.7);
-        for (scale, kappa) in [(1.0, 0.0), (1.3, 1.0)] {
+        for (scale, ease) in [(1.0_f64, Ease::Absolute), (1.3, Ease::Relative)] {
             let move_ = |p: &Vec3| turn * p * scale + Vec3::new(1.0, 2.0, 3.0);
             let mut target = body.clone();
             target.positions = body.positions.iter().map(move_).collect();
-            let map = BodyMap::new(&body, &target, kappa);
+            let map = BodyMap::new(&body, &target);
             for i in 0..50 {
                 let x = point(i);
-                let carried = map.carry(x, x.normalize(), x.norm() - 0.3);
+                let carried = map.carry(x, x.normalize(), x.norm() - 0.3, ease.into());
                 // Rounding of a 3 × 3 system of condition 1 / THIN.
                 assert!((carried.point - move_(&x)).norm() < 1e-12);
-                assert!((carried.ease - scale.powf(kappa)).abs() < 1e-12);
+                assert!((carried.ease - scale).abs() < 1e-12);
             }
         }
     }
@@ -286,10 +315,11 @@ mod tests {
     #[test]
     fn ease_in_metres_survives_a_larger_body() {
         let body = sphere(0.3, 4);
-        let map = BodyMap::new(&body, &sphere(0.36, 4), 0.0);
+        let map = BodyMap::new(&body, &sphere(0.36, 4));
         for i in 0..50 {
             let direction = point(i).normalize();
-            let carried = map.carry(direction * 0.31, direction, 0.01).point;
+            let ease = Ease::Absolute.into();
+            let carried = map.carry(direction * 0.31, direction, 0.01, ease).point;
             // The patch is a cap 7 cm wide that sags by 7²/(2·30) = 0.8 cm, a fifth more on the
             // larger ball.
             let error = (carried - direction * 0.37).norm();
@@ -299,11 +329,12 @@ mod tests {
 
     #[test]
     fn nothing_tears_between_two_legs() {
-        let map = BodyMap::new(&pair(0.02), &pair(0.08), 0.0);
+        let map = BodyMap::new(&pair(0.02), &pair(0.08));
         let carried: Vec<Vec3> = (0..=400)
             .map(|i| Vec3::new(0.2 * f64::from(i) / 400.0 - 0.1, 0.0, 0.13))
             .map(|x| {
-                map.carry(x, Vec3::z(), (x.z.hypot(x.x.abs() - 0.11)) - 0.1)
+                let distance = x.z.hypot(x.x.abs() - 0.11) - 0.1;
+                map.carry(x, Vec3::z(), distance, Ease::Absolute.into())
                     .point
             })
             .collect();

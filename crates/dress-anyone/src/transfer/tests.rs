@@ -1,0 +1,157 @@
+//! Of the whole: what goes in comes out, moved, scaled, mirrored.
+
+use super::*;
+use crate::body::FileFrame;
+use crate::check::noise;
+use crate::geometry::TriangleMesh;
+use crate::geometry::closest_point::tests::sphere;
+
+fn body(mesh: TriangleMesh) -> Body {
+    Body {
+        name: "ball".to_owned(),
+        mesh,
+        frame: FileFrame::SI,
+        notes: Vec::new(),
+    }
+}
+
+fn moved(body: &Body, f: impl Fn(Vec3) -> Vec3) -> Body {
+    let mut body = body.clone();
+    for p in &mut body.mesh.positions {
+        *p = f(*p);
+    }
+    body
+}
+
+/// An uneven body and an open, wavy cloth around it.
+fn dressed() -> (Body, Vec<Vec3>, Vec<[u32; 3]>) {
+    let bulge = |p: Vec3| p + Vec3::new(0.1, 0.7, 0.05) * p.x * p.y;
+    let cloth = sphere(0.5, 4);
+    let wave = |(i, p): (usize, &Vec3)| bulge(*p) * (1.03 + 0.01 * noise(i));
+    let drape: Vec<Vec3> = cloth.positions.iter().enumerate().map(wave).collect();
+    let mut triangles = cloth.triangles;
+    triangles.retain(|t| t.iter().all(|&v| drape[v as usize].y.abs() < 0.3));
+    (moved(&body(sphere(0.5, 4)), bulge), drape, triangles)
+}
+
+fn farthest(a: &[Vec3], b: &[Vec3]) -> f64 {
+    (a.iter().zip(b))
+        .map(|(a, b)| (a - b).norm())
+        .fold(0.0, f64::max)
+}
+
+fn carry(
+    drape: &[Vec3],
+    triangles: &[[u32; 3]],
+    source: &Body,
+    target: &Body,
+    params: &TransferParams,
+) -> Result<Target, TransferError> {
+    let layout = Layout::plain(drape.len(), triangles.to_vec(), params.ease);
+    target_shape(drape, &layout, source, target, params)
+}
+
+fn transfer(target: impl Fn(Vec3) -> Vec3, ease: Ease) -> (Vec<Vec3>, Target) {
+    let (source, drape, triangles) = dressed();
+    let params = TransferParams {
+        ease,
+        ..Default::default()
+    };
+    let target = moved(&source, target);
+    let result = carry(&drape, &triangles, &source, &target, &params).unwrap();
+    (drape, result)
+}
+
+#[test]
+fn the_source_body_gives_back_the_drape() {
+    for ease in [Ease::Absolute, Ease::Blend(0.5), Ease::Relative] {
+        let (drape, target) = transfer(|p| p, ease);
+        // Rounding of a system of condition about 1e4.
+        assert!(farthest(&target.x_star, &drape) < 1e-11);
+        assert!(target.converged);
+    }
+}
+
+#[test]
+fn a_scaled_body_gives_the_scaled_drape_with_relative_ease() {
+    for scale in [0.6, 1.7] {
+        let (drape, target) = transfer(|p| p * scale, Ease::Relative);
+        let scaled: Vec<Vec3> = drape.iter().map(|x| x * scale).collect();
+        assert!(farthest(&target.x_star, &scaled) < 1e-9);
+    }
+}
+
+#[test]
+fn a_larger_body_keeps_the_ease_in_metres() {
+    let (drape, target) = transfer(|p| p * 1.2, Ease::Absolute);
+    let (source, ..) = dressed();
+    let before = ClosestPoint::new(&source.mesh);
+    let gaps = |v: usize| before.signed_distance(drape[v]);
+    let mean = |f: &dyn Fn(usize) -> f64| (0..drape.len()).map(f).sum::<f64>() / drape.len() as f64;
+    // A fifth more of a gap of 1.5 cm would be 3 mm.
+    assert!((mean(&|v| target.clearance[v]) - mean(&gaps)).abs() < 1e-3);
+}
+
+#[test]
+fn moving_the_target_moves_the_result() {
+    let grow = |p: Vec3| Vec3::new(p.x * 1.1, p.y * 0.95 + 0.1 * p.x * p.x, p.z * 1.3);
+    let turn = nalgebra::Rotation3::from_euler_angles(0.4, -1.0, 2.0);
+    let move_ = |p: Vec3| turn * p + Vec3::new(0.3, -1.0, 2.0);
+    let (_, still) = transfer(grow, Ease::Absolute);
+    let (_, turned) = transfer(|p| move_(grow(p)), Ease::Absolute);
+    let expected: Vec<Vec3> = still.x_star.iter().map(|&x| move_(x)).collect();
+    assert!(farthest(&turned.x_star, &expected) < 1e-9);
+    assert_eq!(still.iterations, turned.iterations);
+}
+
+#[test]
+fn mirrored_in_is_mirrored_out() {
+    let grow = |p: Vec3| Vec3::new(p.x * 1.1 + 0.05 * p.y, p.y * 0.95, p.z * 1.3);
+    let mirror = |p: Vec3| Vec3::new(-p.x, p.y, p.z);
+    let flip = |ts: &[[u32; 3]]| ts.iter().map(|&[a, b, c]| [a, c, b]).collect::<Vec<_>>();
+    let (source, drape, triangles) = dressed();
+    let mirrored = |b: &Body| {
+        let mut body = moved(b, mirror);
+        body.mesh.triangles = flip(&body.mesh.triangles);
+        body
+    };
+    let target = moved(&source, grow);
+    let params = TransferParams::default();
+    let one = carry(&drape, &triangles, &source, &target, &params).unwrap();
+    let drape: Vec<Vec3> = drape.iter().map(|&x| mirror(x)).collect();
+    let [source, target] = [&source, &target].map(mirrored);
+    let other = carry(&drape, &flip(&triangles), &source, &target, &params).unwrap();
+    let back: Vec<Vec3> = other.x_star.iter().map(|&x| mirror(x)).collect();
+    assert!(farthest(&back, &one.x_star) < 1e-9);
+}
+
+#[test]
+fn no_vertex_is_left_in_the_body() {
+    // A bulge of 12 cm under a gap of 1.5 cm, narrower than the binding's patch.
+    let dent = |p: Vec3| {
+        let near = (-(p - Vec3::z() * 0.5).norm_squared() / 0.005).exp();
+        p + p.normalize() * 0.12 * near
+    };
+    let (_, target) = transfer(dent, Ease::Absolute);
+    let least = target
+        .clearance
+        .iter()
+        .copied()
+        .fold(f64::INFINITY, f64::min);
+    // The thickness, less rounding.
+    assert!(least > 3e-3 - 1e-4, "{least}");
+}
+
+#[test]
+fn what_cannot_be_carried_says_why() {
+    let (source, mut drape, triangles) = dressed();
+    let params = TransferParams::default();
+    let other = body(sphere(0.5, 2));
+    let error = carry(&drape, &triangles, &source, &other, &params).unwrap_err();
+    assert!(matches!(error, TransferError::DifferentTopology { .. }));
+    let error = carry(&drape, &[], &source, &source, &params).unwrap_err();
+    assert_eq!(error, TransferError::Empty("the drape".to_owned()));
+    drape[5].y = f64::NAN;
+    let error = carry(&drape, &triangles, &source, &source, &params).unwrap_err();
+    assert_eq!(error, TransferError::NotFinite("the drape".to_owned()));
+}
