@@ -79,27 +79,13 @@ impl BoxTree {
 
     /// Visits every box that overlaps or touches `query`, always in the same order.
     pub fn overlapping(&self, query: &Aabb, mut visit: impl FnMut(u32)) {
-        let mut stack = [0_u32; MAX_DEPTH];
-        let mut height = usize::from(!self.nodes.is_empty());
-        while height > 0 {
-            height -= 1;
-            let index = stack[height];
-            let node = &self.nodes[index as usize];
-            if !overlap(&node.hull, query) {
-                continue;
-            }
-            if node.count == 0 {
-                stack[height] = node.first;
-                stack[height + 1] = index + 1;
-                height += 2;
-                continue;
-            }
-            for place in node.places() {
+        self.leaves_within(query, 0, |leaf| {
+            for place in leaf.places() {
                 if overlap(&self.boxes[place], query) {
                     visit(self.order[place]);
                 }
             }
-        }
+        });
     }
 
     /// What `visit` finds in every pair of an own box and one of `other` that overlap, always in the

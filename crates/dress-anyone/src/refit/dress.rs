@@ -54,14 +54,8 @@ pub fn holds(garment: &Garment, x: &[Vec3], params: &HoldParams) -> Vec<Hold> {
     let top = x.iter().map(|p| p.y).fold(f64::NEG_INFINITY, f64::max);
     let below_top = |v: u32| top - x[mesh.sewing[v as usize] as usize].y;
     let carried = |v: u32| below_top(v) > params.carried;
-    let sewn = |id: EdgeId| {
-        garment
-            .pattern
-            .stitches
-            .iter()
-            .any(|s| s.sides.contains(&id))
-    };
-    let free = |id: EdgeId| !sewn(id);
+    let stitches = &garment.pattern.stitches;
+    let free = |id: EdgeId| !stitches.iter().any(|stitch| stitch.sides.contains(&id));
     let mut lengths: BTreeMap<u32, f64> = BTreeMap::new();
     for (p, panel) in garment.pattern.panels.iter().enumerate() {
         for (e, edge) in panel.edges.iter().enumerate() {
@@ -69,7 +63,8 @@ pub fn holds(garment: &Garment, x: &[Vec3], params: &HoldParams) -> Vec<Hold> {
             let labelled = is_label(edge, params) && !vertices.iter().all(|v| carried(*v));
             let id = EdgeId { panel: p, edge: e };
             let on_rim = || vertices.iter().all(|v| below_top(*v) < RIM) && free(id);
-            if !labelled && !(params.rim && on_rim()) {
+            let held = labelled || params.rim && on_rim();
+            if !held {
                 continue;
             }
             for pair in vertices.windows(2) {

@@ -1,8 +1,8 @@
 //! One XPBD time step (paper §3.1; Macklin et al. 2016, with the velocity factor τ).
 //!
 //! x̃ = x + Δt v + Δt² g, then sweeps of (∇C M⁻¹ ∇Cᵀ + α̃) Δλ = −C − α̃λ over membrane, bending,
-//! contact and holds in a fixed order (membrane and bending by colours, in lanes: [`stretch`],
-//! [`turn`]), then v ← τ (x − x_n)/Δt. It brings placed panels together;
+//! contact and holds in a fixed order (membrane and bending by colours, in lanes: `stretch`,
+//! `turn`), then v ← τ (x − x_n)/Δt. It brings placed panels together;
 //! at usual sweep counts its rest state is centimetres too long (METHOD §1.5), so the static solve
 //! follows.
 //!

@@ -147,6 +147,20 @@ pub(super) fn of_lane(a: Lane3, l: usize) -> Vec3 {
     Vec3::new(a[0].0[l], a[1].0[l], a[2].0[l])
 }
 
+/// The vectors of all lanes, each in its element's place.
+pub(super) fn in_place<'b>(
+    count: usize,
+    lanes: impl Iterator<Item = (Lane3, &'b [u32])>,
+) -> Vec<Vec3> {
+    let mut all = vec![Vec3::zeros(); count];
+    for (lane, elements) in lanes {
+        for (l, e) in elements.iter().enumerate() {
+            all[*e as usize] = of_lane(lane, l);
+        }
+    }
+    all
+}
+
 /// The elements of each block and how many of them count, by colours: pieces of one colour share no
 /// vertex. Blocks that a colour does not fill repeat their first element.
 pub(super) fn blocks<const K: usize>(

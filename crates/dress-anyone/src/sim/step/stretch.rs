@@ -9,7 +9,7 @@
 )]
 
 use super::lanes::{
-    LANES, Lane, Lane3, blocks, difference, dot, gather, of_lane, scaled, scatter, sum,
+    LANES, Lane, Lane3, blocks, difference, dot, gather, in_place, of_lane, scaled, scatter, sum,
 };
 use crate::geometry::Vec3;
 use crate::sim::cloth::{Cloth, Rest};
@@ -115,13 +115,11 @@ impl Stretch {
 
     /// λ of each triangle.
     pub(super) fn lambda(&self) -> Vec<Vec3> {
-        let mut lambda = vec![Vec3::zeros(); self.order.len()];
-        for block in &self.blocks {
-            for l in 0..block.count {
-                lambda[block.triangles[l] as usize] = of_lane(block.lambda, l);
-            }
-        }
-        lambda
+        let lanes = self
+            .blocks
+            .iter()
+            .map(|b| (b.lambda, &b.triangles[..b.count]));
+        in_place(self.order.len(), lanes)
     }
 
     /// Visits every triangle once, and notes the visits on `tape`.

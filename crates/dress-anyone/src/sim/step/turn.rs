@@ -8,7 +8,7 @@
     reason = "what is not inlined into the dispatched loop is not compiled for wide registers"
 )]
 
-use super::lanes::{LANES, Lane, Lane3, blocks, gather, of_lane, scaled, scatter, sum};
+use super::lanes::{LANES, Lane, Lane3, blocks, gather, in_place, of_lane, scaled, scatter, sum};
 use crate::geometry::Vec3;
 use crate::sim::cloth::{Cloth, Rest};
 
@@ -90,13 +90,8 @@ impl Turn {
 
     /// λ of each hinge.
     pub(super) fn lambda(&self) -> Vec<Vec3> {
-        let mut lambda = vec![Vec3::zeros(); self.order.len()];
-        for block in &self.blocks {
-            for l in 0..block.count {
-                lambda[block.hinges[l] as usize] = of_lane(block.lambda, l);
-            }
-        }
-        lambda
+        let lanes = self.blocks.iter().map(|b| (b.lambda, &b.hinges[..b.count]));
+        in_place(self.order.len(), lanes)
     }
 
     /// Visits every hinge once, and notes Δλ on `tape`.
