@@ -4,7 +4,7 @@ pub mod fabrics;
 mod summary;
 
 use crate::geometry::{Vec2, Vec3};
-use crate::pattern::{Pattern, PatternMesh};
+use crate::pattern::{Pattern, PatternMesh, triangulate};
 use serde::{Deserialize, Serialize};
 pub use summary::Summary;
 
@@ -26,12 +26,12 @@ impl Garment {
     /// Cloth positions of the flat panels as placed around the body \[m\]; sewn vertices take the
     /// mean of their copies.
     pub fn placed(&self) -> Vec<Vec3> {
-        self.moved(&mut |p| p).0
+        self.moved(|p| p).0
     }
 
     /// The cloth with its panels placed and every point moved by `motion`, sewn \[m\]; and the rest
     /// shape that would lie so but for what leaves the panels' planes.
-    pub fn moved(&self, motion: &mut dyn FnMut(Vec3) -> Vec3) -> (Vec<Vec3>, Vec<Vec2>) {
+    pub fn moved(&self, motion: impl Fn(Vec3) -> Vec3) -> (Vec<Vec3>, Vec<Vec2>) {
         let mut placed = vec![Vec3::zeros(); self.mesh.x_bar.len()];
         let mut flat = self.mesh.x_bar.clone();
         for (panel, range) in self.pattern.panels.iter().zip(&self.mesh.panel_vertices) {
@@ -44,6 +44,23 @@ impl Garment {
             }
         }
         (self.mesh.sew(&placed), flat)
+    }
+
+    /// The same pattern in a mesh of about `vertices` cloth vertices, not draped; none if it cannot be
+    /// meshed so.
+    pub fn remeshed(&self, vertices: usize) -> Option<Self> {
+        let triangles = 0..self.mesh.triangles.len();
+        let area: f64 = triangles
+            .map(|t| self.mesh.rest_area(t, &self.mesh.x_bar))
+            .sum();
+        // Equilateral triangles, two for each vertex.
+        let edge = (2.0 / 3.0_f64.sqrt() * area / vertices as f64).sqrt();
+        Some(Self {
+            name: self.name.clone(),
+            pattern: self.pattern.clone(),
+            mesh: triangulate::mesh(&self.pattern, edge).ok()?,
+            drape: None,
+        })
     }
 }
 

@@ -14,7 +14,6 @@ use crate::geometry::{Vec2, Vec3};
 use crate::loss::Losses;
 use crate::pattern::resample::resample;
 use crate::pattern::symmetry::Symmetry;
-use crate::pattern::triangulate;
 use crate::sim::{Assembly, Cloth, Scene};
 use crate::transfer::{Layout, target_shape};
 use std::sync::Arc;
@@ -118,23 +117,12 @@ impl<'a> Prepared<'a> {
     /// The garment in a mesh of about [`RefitParams::coarse`] vertices; none if it has few more than
     /// that itself, or cannot be meshed so coarsely, or is searched in the paper's way.
     pub(super) fn coarser(&self) -> Option<Garment> {
-        let fine = &self.garment.mesh;
-        let (count, wanted) = (fine.cloth_vertex_count, self.params.coarse);
+        let (count, wanted) = (self.garment.mesh.cloth_vertex_count, self.params.coarse);
         let paper = self.params.descent.gradient == Gradient::Trajectory;
         if paper || wanted == 0 || count < WORTH_COARSENING * wanted {
             return None;
         }
-        let triangles = 0..fine.triangles.len();
-        let area: f64 = triangles.map(|t| fine.rest_area(t, &fine.x_bar)).sum();
-        // Equilateral triangles, two for each vertex.
-        let edge = (2.0 / 3.0_f64.sqrt() * area / wanted as f64).sqrt();
-        let mesh = triangulate::mesh(&self.garment.pattern, edge).ok()?;
-        Some(Garment {
-            name: self.garment.name.clone(),
-            pattern: self.garment.pattern.clone(),
-            drape: None,
-            mesh,
-        })
+        self.garment.remeshed(wanted)
     }
 
     /// The same search with the mesh of `coarse`: same aim, same cages, so its unknowns are these.

@@ -2,6 +2,7 @@
 //! painted mesh may be numbered otherwise, or be finer or coarser, but not lie elsewhere.
 
 use super::ease::{Ease, EaseAt};
+use crate::geometry::bvh::Bvh;
 use crate::geometry::{Vec3, bounds};
 use crate::problem::Problem;
 use rayon::prelude::*;
@@ -33,11 +34,21 @@ impl Paint {
             .into_iter()
             .min_by(|a, b| misfit(a).total_cmp(&misfit(b)))
             .unwrap_or(1.0);
+        let points: Vec<Vec3> = self.points.iter().map(|p| p * unit).collect();
+        let tree = Bvh::new(&points.iter().map(|p| [*p; 3]).collect::<Vec<_>>());
         let nearest = |x: &Vec3| -> Option<(f64, f64)> {
-            let squared = |p: &Vec3| (p * unit - x).norm_squared();
-            let each = self.points.iter().zip(&self.kappa);
-            let (point, kappa) = each.min_by(|a, b| squared(a.0).total_cmp(&squared(b.0)))?;
-            Some((squared(point).sqrt(), *kappa))
+            let mut best = None;
+            tree.nearest(*x, f64::INFINITY, |place, bound| {
+                let point = tree.order()[place] as usize;
+                let squared = (points[point] - x).norm_squared();
+                if squared < bound {
+                    best = Some((squared.sqrt(), self.kappa[point]));
+                    squared
+                } else {
+                    bound
+                }
+            });
+            best
         };
         let found: Vec<(f64, f64)> = drape.par_iter().filter_map(nearest).collect();
         let mut distances: Vec<f64> = found.iter().map(|(distance, _)| *distance).collect();

@@ -6,11 +6,11 @@
 //! static solve decides. Where the coarse cloth does not come to rest, or the carried one goes
 //! through itself, the fine mesh starts from its panels after all.
 
-use super::{Dressing, placed};
+use super::Dressing;
+use super::placed::placed;
 use crate::garment::Garment;
 use crate::geometry::intersections;
 use crate::pattern::resample::resample;
-use crate::pattern::triangulate;
 use crate::sim::drape::DrapeProgress;
 use crate::sim::equilibrium::{EquilibriumParams, RestStatus};
 use crate::sim::{Drape, SimParams, Solver, Start};
@@ -61,28 +61,18 @@ pub(super) fn from_panels(
 /// The garment in a coarser mesh; none if it has few vertices, cannot be meshed so coarsely, or is
 /// draped in the paper's way.
 fn coarser(garment: &Garment, sim: &SimParams) -> Option<Garment> {
-    let fine = &garment.mesh;
-    let wanted = fine.cloth_vertex_count / COARSENING;
+    let wanted = garment.mesh.cloth_vertex_count / COARSENING;
     if sim.solver == Solver::Xpbd || wanted < LEAST {
         return None;
     }
-    let area: f64 = (0..fine.triangles.len())
-        .map(|t| fine.rest_area(t, &fine.x_bar))
-        .sum();
-    // Equilateral triangles, two for each vertex.
-    let edge = (2.0 / 3.0_f64.sqrt() * area / wanted as f64).sqrt();
-    Some(Garment {
-        name: garment.name.clone(),
-        pattern: garment.pattern.clone(),
-        mesh: triangulate::mesh(&garment.pattern, edge).ok()?,
-        drape: None,
-    })
+    garment.remeshed(wanted)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::loss::fixtures::two_panels;
+    use crate::pattern::triangulate;
 
     /// Two panels that would be too small for a coarser mesh, in a mesh of their own.
     fn garment(edge: f64) -> Garment {
