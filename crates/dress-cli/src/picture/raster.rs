@@ -10,7 +10,7 @@ use super::canvas::{Canvas, nearest_on_segment};
 use super::colour::{INK, Rgb};
 
 /// Samples per pixel, each way.
-pub const SAMPLES: usize = 3;
+pub const SAMPLES: usize = 2;
 
 /// Unit directions towards the lights: right, up, towards the eye.
 const KEY: [f32; 3] = [-0.462, 0.525, 0.715];
@@ -55,7 +55,8 @@ impl Raster {
     pub fn triangle(&mut self, corners: [Corner; 3]) {
         let [a, b, c] = corners.map(|corner| corner.at);
         let doubled_area = edge(a, b, [c[0], c[1]]);
-        if !doubled_area.is_finite() || doubled_area == 0.0 {
+        let per_area = 1.0 / doubled_area;
+        if !per_area.is_finite() {
             return;
         }
         let low = |i: usize| a[i].min(b[i]).min(c[i]);
@@ -64,7 +65,7 @@ impl Raster {
             for x in samples(low(0), high(0), self.width) {
                 let p = [x as f64 + 0.5, y as f64 + 0.5];
                 let weights = [edge(b, c, p), edge(c, a, p), edge(a, b, p)];
-                let weights = weights.map(|w| w / doubled_area);
+                let weights = weights.map(|w| w * per_area);
                 if weights.iter().any(|w| *w < 0.0) {
                     continue;
                 }

@@ -1,0 +1,185 @@
+use super::*;
+use crate::check::{assert_derivative, noise};
+use crate::geometry::closest_point::tests::sphere;
+
+fn direction(i: usize) -> Vec3 {
+    Vec3::new(noise(5 * i), noise(7 * i + 1), noise(11 * i + 2)).normalize()
+}
+
+#[test]
+fn the_field_of_a_sphere_is_its_distance_smoothed_as_told() {
+    let (radius, h) = (0.12, 5e-3);
+    let field = DistanceField::new(&sphere(radius, 6), h, 0.03);
+    for i in 0..500 {
+        let n = direction(i);
+        // From 4 cm inside to the end of the band.
+        let d = 0.035 * noise(i + 77) - 0.005;
+        let p = n * (radius + d);
+        let sample = field.sample(p).unwrap();
+        // ∇²d = 2/r. Circumcircles of 2.6 mm sag by 2.6²/(2·120) mm.
+        let expected = d + h * h / 6.0 * 2.0 / (radius + d);
+        let error = sample.distance - expected;
+        // Nodes that are means lie too high by ½ h² 2/r at most; every second one does, so the slope
+        // goes up and down by half of that per spacing.
+        let means = if d.abs() < 10e-3 {
+            0.0
+        } else {
+            h * h / (radius + d)
+        };
+        assert!(-29e-6 < error && error < 29e-6 + means, "{error:e} at {d}");
+        // Facets tilt by up to 1 degree; the spline averages over a few of them.
+        let tilt = sample.gradient.normalize().angle(&n);
+        assert!(
+            tilt < 0.2_f64.to_radians() + 0.5 * means / h,
+            "{tilt:e} at {d}"
+        );
+    }
+    assert_eq!(field.sample(Vec3::x() * 0.4), None);
+    assert_eq!(field.sample(Vec3::repeat(f64::NAN)), None);
+}
+
+#[test]
+fn every_point_within_the_band_has_a_sample() {
+    let field = DistanceField::new(&sphere(0.1, 3), 7e-3, 0.02);
+    for i in 0..2000 {
+        let p = direction(i) * (0.12 * noise(i + 5).abs().cbrt() - 1e-9);
+        assert!(field.sample(p).is_some());
+    }
+}
+
+#[test]
+fn gradient_and_hessian_are_those_of_the_spline() {
+    let field = DistanceField::new(&sphere(0.05, 2), 5e-3, 0.03);
+    for i in 0..100 {
+        let p = direction(i) * (0.05 + 0.025 * noise(i + 3));
+        let along = direction(i + 500);
+        let at = |s: f64| field.sample_with_hessian(p + along * s).unwrap();
+        let (sample, hessian) = at(0.0);
+        let slope = sample.gradient.dot(&along);
+        assert_derivative(|s| at(s).0.distance, slope, 1e-6, 1.0, 1e-6);
+        for axis in 0..3 {
+            let slope = hessian.row(axis).transpose().dot(&along);
+            // Hessians are of the order of 1/radius = 20 per metre.
+            assert_derivative(|s| at(s).0.gradient[axis], slope, 1e-7, 20.0, 1e-6);
+        }
+    }
+}
+
+#[test]
+fn second_derivatives_do_not_jump_between_cells() {
+    let field = DistanceField::new(&sphere(0.05, 2), 5e-3, 0.03);
+    for i in 0..20 {
+        let cell = (
+            field.grid.position([20, 11 + i % 8, 13]) - Vec3::x() * 1e-9,
+            2e-9,
+        );
+        let before = field.sample_with_hessian(cell.0).unwrap().1;
+        let after = field
+            .sample_with_hessian(cell.0 + Vec3::x() * cell.1)
+            .unwrap()
+            .1;
+        // Third derivatives below 1e5 per square metre.
+        assert!((after - before).norm() < 1e-3);
+    }
+}
+
+#[test]
+fn the_number_of_threads_changes_nothing() {
+    let build = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+        let body = sphere(0.05, 3);
+        pool.unwrap()
+            .install(|| DistanceField::new(&body, 5e-3, 0.03))
+    };
+    assert_eq!(build(1), build(2));
+}
+
+#[test]
+fn holes_are_closed_and_what_lies_inside_is_inside() {
+    // A head with a hole in its crown, an eye within, wound inside out.
+    let mut head = sphere(0.1, 4);
+    head.triangles
+        .retain(|t| t.iter().any(|&v| head.positions[v as usize].y < 0.09));
+    let eye = sphere(0.02, 2);
+    let offset = head.positions.len() as u32;
+    head.positions
+        .extend(eye.positions.iter().map(|p| p + Vec3::z() * 0.05));
+    let flipped = |t: &[u32; 3]| [t[0] + offset, t[2] + offset, t[1] + offset];
+    head.triangles.extend(eye.triangles.iter().map(flipped));
+    let field = DistanceField::new(&head, 5e-3, 0.03);
+    for i in 0..500 {
+        let p = direction(i) * 0.12 * noise(i + 9).abs();
+        let deep = p.norm() < 0.08 && (p - Vec3::z() * 0.05).norm() > 0.028;
+        let sample = field.sample(p).unwrap();
+        // On the eye itself the distance vanishes; the smoothing lifts it a little.
+        assert!(sample.distance < 1e-3 || p.norm() > 0.085);
+        assert!(!deep || sample.distance < -5e-3);
+        assert!(p.norm() < 0.105 || sample.distance > 2e-3);
+    }
+}
+
+#[test]
+fn a_sample_below_a_limit_is_the_sample_wherever_it_is_below_it() {
+    let field = DistanceField::new(&sphere(0.05, 3), 5e-3, 0.03);
+    let mut counts = [0, 0];
+    for i in 0..3000 {
+        let p = direction(i) * (0.09 * noise(i + 5).abs());
+        for limit in [-0.01, 0.0, 3e-3, 0.02] {
+            let sample = field.sample(p);
+            let below = sample.filter(|s| s.distance < limit);
+            assert_eq!(field.sample_below(p, limit), below);
+            assert_eq!(field.sample_with_hessian(p).map(|(s, _)| s), sample);
+            counts[usize::from(below.is_some())] += 1;
+        }
+    }
+    assert!(counts.iter().all(|n| *n > 1000), "{counts:?}");
+    assert_eq!(field.sample_below(Vec3::repeat(f64::NAN), 1.0), None);
+    assert_eq!(field.sample_below(Vec3::repeat(9.0), 1.0), None);
+}
+
+#[test]
+fn nothing_has_no_distance() {
+    let field = DistanceField::new(&TriangleMesh::default(), 5e-3, 0.03);
+    assert_eq!(field.sample(Vec3::zeros()), None);
+}
+
+/// `DRESS_BODY=….obj cargo test -p dress-anyone build_time -- --ignored --nocapture`
+#[test]
+#[ignore = "measures; needs a body"]
+fn build_time_and_memory_of_a_real_body() {
+    let Some(path) = std::env::var_os("DRESS_BODY") else {
+        println!("skipped: DRESS_BODY names no .obj file");
+        return;
+    };
+    let text = std::fs::read_to_string(path).unwrap();
+    let mut body = TriangleMesh::default();
+    for line in text.lines() {
+        let mut words = line.split_whitespace();
+        let kind = words.next();
+        if kind == Some("v") {
+            let numbers = words.take(3).map(|x| x.parse::<f64>().unwrap());
+            body.positions.push(Vec3::from_iterator(numbers));
+        } else if kind == Some("f") {
+            let index = |word: &str| word.split('/').next().unwrap().parse::<u32>().unwrap() - 1;
+            let corners: Vec<u32> = words.map(index).collect();
+            let fan = corners[1..]
+                .windows(2)
+                .map(|pair| [corners[0], pair[0], pair[1]]);
+            body.triangles.extend(fan);
+        }
+    }
+    let start = std::time::Instant::now();
+    let field = DistanceField::new(&body, DistanceField::SPACING, DistanceField::OUTER);
+    println!(
+        "{} triangles, {} nodes, {:.1} MB, {:.2} s",
+        body.triangles.len(),
+        field.values.len(),
+        field.memory() as f64 * 1e-6,
+        start.elapsed().as_secs_f64()
+    );
+    let sunk = field.values.iter().filter(|v| **v < 0.0).count();
+    println!(
+        "{:.4} m³ inside",
+        sunk as f64 * DistanceField::SPACING.powi(3)
+    );
+}
