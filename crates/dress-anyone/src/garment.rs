@@ -1,10 +1,12 @@
 //! A garment: pattern, sewing, fabric, and — once it has one — its drape.
 
+mod cut;
 pub mod fabrics;
 mod summary;
 
 use crate::geometry::{Vec2, Vec3};
 use crate::pattern::{Pattern, PatternMesh, triangulate};
+pub use cut::{Cut, FabricZone, cuts, unknown_panels};
 use serde::{Deserialize, Serialize};
 pub use summary::Summary;
 
@@ -64,7 +66,7 @@ impl Garment {
     }
 }
 
-/// What the cloth is made of. Warp runs along the y axis of each panel, weft along x.
+/// What cloth is made of. On the straight grain warp runs along the y axis of a panel, weft along x.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Fabric {

@@ -7,6 +7,7 @@ mod canonical;
 pub mod curve;
 mod interior;
 pub mod mesh;
+pub(crate) mod names;
 pub mod outline;
 pub mod resample;
 mod sew;

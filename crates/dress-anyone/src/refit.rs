@@ -19,7 +19,7 @@ mod written;
 use crate::body::Body;
 use crate::cage::CageParams;
 use crate::descent::DescentParams;
-use crate::garment::{Fabric, Garment};
+use crate::garment::{Cut, Fabric, FabricZone, Garment, cuts};
 use crate::geometry::{Vec2, Vec3};
 use crate::loss::{LossParams, LossTerms};
 use crate::pattern::Pattern;
@@ -47,6 +47,8 @@ pub struct RefitParams {
     pub outline_tolerance: f64,
     /// The cloth.
     pub fabric: Fabric,
+    /// Panels of another fabric or grain.
+    pub fabric_zones: Vec<FabricZone>,
     /// What keeps it up.
     pub hold: HoldParams,
     /// The drape.
@@ -64,12 +66,20 @@ pub struct RefitParams {
     pub coarse: usize,
 }
 
+impl RefitParams {
+    /// What the panels of `garment` are cut from, `[panel]`.
+    pub fn cuts(&self, garment: &Garment) -> Vec<Cut> {
+        cuts(&garment.pattern, &self.fabric, &self.fabric_zones)
+    }
+}
+
 impl Default for RefitParams {
     fn default() -> Self {
         Self {
             symmetry: true,
             outline_tolerance: crate::pattern::outline::TOLERANCE,
             fabric: Fabric::default(),
+            fabric_zones: Vec::new(),
             hold: HoldParams::default(),
             sim: SimParams::default(),
             transfer: TransferParams::default(),
@@ -270,14 +280,7 @@ fn drape_to_rest(
     params: &RefitParams,
     observe: &mut Observer<'_>,
 ) -> Result<Vec<Vec3>, RefitError> {
-    let found = drape_on(
-        garment,
-        body,
-        &params.fabric,
-        &params.hold,
-        &params.sim,
-        &mut |p| observe(&Progress::Drape(p)),
-    );
+    let found = drape_on(garment, body, params, &mut |p| observe(&Progress::Drape(p)));
     if found.status == RestStatus::Stopped {
         return Err(RefitError::Stopped);
     }

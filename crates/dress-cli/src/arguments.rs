@@ -4,6 +4,7 @@ pub mod design;
 pub mod fitting;
 
 use crate::body::arguments::BodyCommand;
+use crate::params::fabric::{ChosenFabrics, FabricOf};
 use crate::params::{self, Params};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use design::DesignArguments;
@@ -157,9 +158,10 @@ pub struct ReadingArguments {
     /// Parameters (TOML); `dress params` prints them all
     #[arg(long, value_name = "FILE")]
     pub params: Option<PathBuf>,
-    /// What the cloth is made of: a name, or a file with the keys of the table "fabric" (TOML)
-    #[arg(long, value_name = "NAME|FILE")]
-    pub fabric: Option<PathBuf>,
+    /// What the cloth, or a panel of it, is made of: a name, or a file with the keys of the table "fabric"
+    /// (TOML); may be given several times
+    #[arg(long, value_name = "[PANEL:]NAME|FILE", value_parser = FabricOf::read)]
+    pub fabric: Vec<FabricOf>,
     /// Length of mesh edges, where a pattern has to be meshed [default: 20]
     #[arg(long, value_name = "MM", value_parser = positive)]
     pub resolution: Option<f64>,
@@ -272,15 +274,15 @@ impl Up {
 impl ReadingArguments {
     /// The parameters: the file's, overridden by the command line.
     pub fn params(&self) -> Result<Params, BadInput> {
-        let mut params = self
-            .params
-            .as_deref()
-            .map_or_else(|| Ok(Params::default()), params::read)?;
+        let fabrics = ChosenFabrics::find(&self.fabric)?;
+        let file = self.params.as_deref();
+        let mut params = file.map_or_else(
+            || Ok(Params::default()),
+            |file| params::read(file, fabrics.whole),
+        )?;
+        fabrics.over(&mut params.refit);
         if let Some(millimetres) = self.resolution {
             params.read.resolution = 1e-3 * millimetres;
-        }
-        if let Some(fabric) = &self.fabric {
-            params.refit.fabric = params::fabric(fabric)?;
         }
         match self.panel_rotation {
             Some(Rotation::Intrinsic) => params.read.panel_rotation = RotationOrder::Intrinsic,

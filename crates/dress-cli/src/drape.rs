@@ -11,7 +11,7 @@ use crate::show::{Shown, contact_sheet};
 use crate::summary;
 use anyhow::Context;
 use dress_anyone::body::Body;
-use dress_anyone::garment::Garment;
+use dress_anyone::garment::{Garment, unknown_panels};
 use dress_anyone::geometry::Vec3;
 use dress_anyone::io::garment::Loaded;
 use dress_anyone::io::output::{Output, check_writable};
@@ -53,17 +53,10 @@ pub fn run(arguments: &DrapeArguments) -> Result<String, Failure> {
     progress.stage("drape");
     let start = Instant::now();
     let refit = &params.refit;
-    let found = drape_on(
-        garment,
-        &body,
-        &refit.fabric,
-        &refit.hold,
-        &refit.sim,
-        &mut |event| {
-            progress.drape(event);
-            !stop.load(Ordering::SeqCst)
-        },
-    );
+    let found = drape_on(garment, &body, refit, &mut |event| {
+        progress.drape(event);
+        !stop.load(Ordering::SeqCst)
+    });
     let seconds = start.elapsed().as_secs_f64();
     progress.close();
     let accepted = accept(&found, &body);
@@ -130,6 +123,10 @@ fn read(arguments: &DrapeArguments) -> Result<(Params, Loaded, Body), Failure> {
     let ((params, mut loaded), body) = all.expect("nothing was wrong with any of them");
     if let Some((file, start)) = from.flatten() {
         loaded.garment.drape = Some(same_mesh(&loaded.garment, file, start)?);
+    }
+    let unknown = unknown_panels(&loaded.garment.pattern, &params.refit.fabric_zones);
+    if !unknown.is_empty() {
+        return Err(BadInput::new(&arguments.garment, unknown).into());
     }
     note_placement(&mut loaded, &body);
     Ok((params, loaded, body))

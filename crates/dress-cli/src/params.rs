@@ -4,15 +4,19 @@
 //! `dress params` prints; it is written by hand, and a test holds it to the defaults of the structs:
 //! same values, every key, each with a comment above it.
 
-use dress_anyone::garment::{Fabric, fabrics};
+pub mod fabric;
+
+use dress_anyone::garment::Fabric;
 use dress_anyone::io::file::{MEBIBYTE, read_capped};
 use dress_anyone::io::garmentcode::RotationOrder;
 use dress_anyone::problem::{BadInput, Problem};
 use dress_anyone::refit::RefitParams;
+use fabric::ToldFabrics;
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 use toml::de::{DeTable, Deserializer, ValueDeserializer};
-use toml::{Table, Value};
+use toml::{Spanned, Table, Value};
 
 /// All parameters of the program.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -67,74 +71,71 @@ const POSITIVE: [&str; 14] = [
     "descent.step",
 ];
 
-/// The parameters in a TOML file; keys it leaves out keep their defaults.
-pub fn read(path: &Path) -> Result<Params, BadInput> {
+/// The parameters in a TOML file; keys it leaves out keep their defaults. `whole` stands in for its
+/// table `[fabric]`.
+pub fn read(path: &Path, whole: Option<Fabric>) -> Result<Params, BadInput> {
     let bytes = read_capped(path, LIMIT)?;
     let bad = |problems| BadInput::new(path, problems);
     let text = String::from_utf8(bytes)
         .map_err(|_| bad(vec![Problem::whole("this is no text; parameters are TOML")]))?;
-    parse(&text).map_err(bad)
-}
-
-/// The fabric that is called so, or else is in the TOML file at this path.
-pub fn fabric(name: &Path) -> Result<Fabric, BadInput> {
-    if let Some(found) = name.to_str().and_then(fabrics::named) {
-        return Ok(found.fabric);
-    }
-    let bad = |problems| BadInput::new(name, problems);
-    if !name.exists() {
-        let names: Vec<&str> = fabrics::ALL.iter().map(|fabric| fabric.name).collect();
-        return Err(bad(vec![Problem::whole(format!(
-            "there is no fabric of this name, and no such file; there are {}",
-            names.join(", ")
-        ))]));
-    }
-    let bytes = read_capped(name, LIMIT)?;
-    let text = String::from_utf8(bytes)
-        .map_err(|_| bad(vec![Problem::whole("this is no text; fabrics are TOML")]))?;
-    let given: Table = (text.parse()).map_err(|error| bad(vec![in_plain_words(&text, &error)]))?;
-    let defaults = defaults();
-    let known = defaults["fabric"].as_table().expect("[fabric] is a table");
-    let mut problems = Vec::new();
-    unknown_keys(&given, known, &mut vec![], &defaults, &mut problems);
-    numbers_out_of_range(&given, "fabric", &mut problems);
-    if !problems.is_empty() {
-        return Err(bad(problems));
-    }
-    toml::from_str(&text).map_err(|error| bad(vec![in_plain_words(&text, &error)]))
+    parse(&text, whole).map_err(bad)
 }
 
 /// [`read`] of a file's text.
-fn parse(text: &str) -> Result<Params, Vec<Problem>> {
+fn parse(text: &str, whole: Option<Fabric>) -> Result<Params, Vec<Problem>> {
     let given: Table = text
         .parse()
         .map_err(|error| vec![in_plain_words(text, &error)])?;
-    let known = defaults();
+    let known = known();
     let mut problems = Vec::new();
     unknown_keys(&given, &known, &mut Vec::new(), &known, &mut problems);
     numbers_out_of_range(&given, "", &mut problems);
+    fabric::zone_problems(&given, &known, &mut problems);
     if !problems.is_empty() {
         return Err(problems);
     }
-    typed(text).map_err(|error| vec![in_plain_words(text, &error)])
+    let (mut params, told) = typed(text).map_err(|error| vec![in_plain_words(text, &error)])?;
+    told.over(whole, &mut params.refit)?;
+    Ok(params)
 }
 
-/// The parameters in `text`; errors know their place in it.
-fn typed(text: &str) -> Result<Params, toml::de::Error> {
+/// The parameters in `text`, and what it tells of fabrics; errors know their place in it.
+fn typed(text: &str) -> Result<(Params, ToldFabrics), toml::de::Error> {
     let mut table = DeTable::parse(text)?;
-    let read = table.get_mut().remove("read");
-    Ok(Params {
-        read: match read {
-            Some(read) => ReadParams::deserialize(ValueDeserializer::from(read))?,
-            None => ReadParams::default(),
-        },
+    let told = ToldFabrics {
+        whole: taken(&mut table, "fabric")?,
+        zones: taken(&mut table, "fabric_zones")?,
+    };
+    let params = Params {
+        read: taken(&mut table, "read")?,
         refit: RefitParams::deserialize(Deserializer::from(table))?,
-    })
+    };
+    Ok((params, told))
+}
+
+/// The value of `key`, which is taken out of the table; its default if it is not there.
+fn taken<T: DeserializeOwned + Default>(
+    table: &mut Spanned<DeTable<'_>>,
+    key: &str,
+) -> Result<T, toml::de::Error> {
+    match table.get_mut().remove(key) {
+        Some(value) => T::deserialize(ValueDeserializer::from(value)),
+        None => Ok(T::default()),
+    }
 }
 
 /// All keys with their defaults.
 fn defaults() -> Table {
     Table::try_from(Params::default()).expect("parameters are a table")
+}
+
+/// All keys that a file may have: the defaults', and a fabric's name.
+fn known() -> Table {
+    let mut known = defaults();
+    if let Some(Value::Table(fabric)) = known.get_mut("fabric") {
+        fabric.insert("like".to_owned(), Value::String(String::new()));
+    }
+    known
 }
 
 /// Numbers of `table`, called `name`, that are no amounts.
@@ -275,7 +276,7 @@ mod tests {
     /// What is wrong with a template.
     fn template_problems(template: &str) -> Vec<String> {
         let mut problems = Vec::new();
-        match parse(template) {
+        match parse(template, None) {
             Ok(params) if params == Params::default() => {}
             Ok(_) => problems.push("a value differs from the default".to_owned()),
             Err(errors) => problems.extend(errors.iter().map(ToString::to_string)),
@@ -312,7 +313,7 @@ mod tests {
     }
 
     fn lines_of(text: &str) -> Vec<String> {
-        let problems = parse(text).expect_err("bad parameters");
+        let problems = parse(text, None).expect_err("bad parameters");
         problems.iter().map(ToString::to_string).collect()
     }
 
@@ -337,18 +338,24 @@ mod tests {
 
     #[test]
     fn keys_left_out_keep_their_defaults() {
-        let params = parse("[sim.step]\nsweeps = 7\n").expect("good parameters");
+        let params = parse("[sim.step]\nsweeps = 7\n", None).expect("good parameters");
         let mut expected = Params::default();
         expected.refit.sim.step.sweeps = 7;
         assert_eq!(params, expected);
         // A whole number where a fraction is expected is fine.
-        let params = parse("fabric.warp = 500").expect("good parameters");
+        let params = parse("fabric.warp = 500", None).expect("good parameters");
         assert_eq!(params.refit.fabric.warp, 500.0);
     }
 
     #[test]
     fn ease_is_a_word_or_a_blend() {
-        let ease = |text: &str| parse(text).expect("good parameters").refit.transfer.ease;
+        let ease = |text: &str| {
+            parse(text, None)
+                .expect("good parameters")
+                .refit
+                .transfer
+                .ease
+        };
         assert_eq!(ease("transfer.ease = \"relative\""), Ease::Relative);
         assert_eq!(ease("transfer.ease = { blend = 0.5 }"), Ease::Blend(0.5));
     }
@@ -364,7 +371,7 @@ mod tests {
                 "key `read.bananas`: there is no such key; known here: `panel_rotation`, \
                  `resolution`",
                 "key `verbosity`: there is no such key; known here: `cage`, `coarse`, `descent`, `fabric`, \
-                 `hold`, `loss`, `outline_tolerance`, `read`, `sim`, `symmetry`, `transfer`",
+                 `fabric_zones`, `hold`, `loss`, `outline_tolerance`, `read`, `sim`, `symmetry`, `transfer`",
             ]
         );
     }
@@ -376,7 +383,10 @@ mod tests {
             ("[read]\nresolution = \"fine\"\n", "line 2"),
             ("[sim\n", "line 1"),
         ] {
-            assert_eq!(parse(text).expect_err("bad parameters")[0].place, line);
+            assert_eq!(
+                parse(text, None).expect_err("bad parameters")[0].place,
+                line
+            );
         }
     }
 
@@ -398,24 +408,6 @@ mod tests {
         for key in POSITIVE {
             assert!(keys.iter().any(|known| known == key), "{key}");
         }
-    }
-
-    #[test]
-    fn fabrics_are_names_or_files() {
-        let denim = fabric(Path::new("denim")).expect("a name");
-        assert_eq!(denim.density, 0.324);
-        let folder = tempfile::tempdir().expect("a folder");
-        let file = folder.path().join("my.toml");
-        std::fs::write(&file, "density = 0.15\nwarp = 2000\n").expect("writable");
-        let mine = fabric(&file).expect("a file");
-        assert_eq!(
-            (mine.density, mine.warp, mine.weft),
-            (0.15, 2000.0, Fabric::default().weft)
-        );
-        std::fs::write(&file, "densty = 0.15\nwarp = -1\n").expect("writable");
-        assert_eq!(fabric(&file).expect_err("two mistakes").problems.len(), 2);
-        let unknown = fabric(Path::new("felt")).expect_err("neither").to_string();
-        assert!(unknown.contains("denim"), "{unknown}");
     }
 
     #[test]

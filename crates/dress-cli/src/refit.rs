@@ -154,15 +154,7 @@ fn in_own_pose(
         drape: Some(carried.x_star),
         ..garment.clone()
     };
-    let hold = &params.hold;
-    let found = drape_on(
-        &there,
-        &body,
-        &params.fabric,
-        hold,
-        &params.sim,
-        &mut |_| true,
-    );
+    let found = drape_on(&there, &body, params, &mut |_| true);
     accept(&found, &body)?;
     Ok((found.x, body))
 }

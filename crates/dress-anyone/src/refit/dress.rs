@@ -3,9 +3,10 @@
 mod coarse;
 mod placed;
 
+use super::RefitParams;
 use crate::body::Body;
 use crate::body::distance_field::DistanceField;
-use crate::garment::{Fabric, Garment};
+use crate::garment::{Cut, Garment};
 use crate::geometry::Vec3;
 use crate::pattern::{Edge, EdgeId};
 use crate::sim::drape::DrapeProgress;
@@ -100,11 +101,10 @@ fn is_held(edge: &Edge, params: &HoldParams) -> bool {
 pub fn drape_on(
     garment: &Garment,
     body: &Body,
-    fabric: &Fabric,
-    hold: &HoldParams,
-    sim: &SimParams,
+    params: &RefitParams,
     observe: &mut dyn FnMut(DrapeProgress) -> bool,
 ) -> Drape {
+    let (hold, sim) = (&params.hold, &params.sim);
     let surface = DistanceField::new(&body.mesh, DistanceField::SPACING, DistanceField::OUTER);
     let mut patient = *sim;
     patient.equilibrium.iterations *= PATIENCE;
@@ -112,7 +112,7 @@ pub fn drape_on(
         let on = Dressing {
             body,
             surface: &surface,
-            fabric,
+            cuts: params.cuts(garment),
             hold,
         };
         match &garment.drape {
@@ -152,7 +152,8 @@ const PATIENCE: usize = 4;
 struct Dressing<'a> {
     body: &'a Body,
     surface: &'a DistanceField,
-    fabric: &'a Fabric,
+    /// `[panel]`.
+    cuts: Vec<Cut>,
     hold: &'a HoldParams,
 }
 
@@ -167,7 +168,7 @@ impl Dressing<'_> {
         sim: &SimParams,
         observe: &mut dyn FnMut(DrapeProgress) -> bool,
     ) -> Drape {
-        let mut cloth = Cloth::new(&garment.mesh, self.fabric);
+        let mut cloth = Cloth::cut_from(&garment.mesh, &self.cuts);
         cloth.holds = holds(garment, placed, self.hold);
         let scene = Scene {
             cloth: &cloth,

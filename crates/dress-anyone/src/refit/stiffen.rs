@@ -7,8 +7,8 @@
 use super::search::{Guess, Search};
 use super::{Clock, Found, Observer, RefitError};
 use crate::descent::DescentParams;
+use crate::sim::Scene;
 use crate::sim::energy::contact::Surface;
-use crate::sim::{Cloth, Scene};
 
 /// Bending rigidity as a multiple of the fabric's: the length over which cloth bends under its own
 /// weight, ∛(B/ρg), grows threefold.
@@ -28,10 +28,10 @@ pub(super) fn stiffened<S: Surface>(
     observe: &mut Observer<'_>,
 ) -> Result<Option<Vec<f64>>, RefitError> {
     let soft = search.scene;
-    let cloth = Cloth {
-        bending: STIFFER * soft.cloth.bending,
-        ..soft.cloth.clone()
-    };
+    let mut cloth = soft.cloth.clone();
+    for material in &mut cloth.materials {
+        material.bending *= STIFFER;
+    }
     let search = Search {
         scene: &Scene {
             cloth: &cloth,

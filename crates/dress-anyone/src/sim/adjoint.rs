@@ -21,11 +21,19 @@ pub fn rest_pull_back(
     for (e, t) in cloth.triangles.iter().enumerate() {
         let corners = t.map(|a| x[a as usize]);
         let multipliers = t.map(|a| lambda[a as usize]);
-        let weight = multipliers.iter().map(|l| l.dot(&GRAVITY)).sum::<f64>() * cloth.density / 3.0;
-        let element = &rest.triangles[e];
-        let by_rest =
-            membrane::rest_pull_back(element, &cloth.elasticity, corners, multipliers, weight);
-        for (v, g) in cloth.rest_triangles[e].iter().zip(by_rest) {
+        let material = cloth.material(e);
+        let along: f64 = multipliers.iter().map(|l| l.dot(&GRAVITY)).sum();
+        let by_rest = membrane::rest_pull_back(
+            &rest.triangles[e],
+            &material.elasticity,
+            corners,
+            multipliers,
+            along * material.density / 3.0,
+        );
+        for (v, g) in cloth.rest_triangles[e]
+            .iter()
+            .zip(material.off_grain(by_rest))
+        {
             hat[*v as usize] += g;
         }
     }
@@ -33,7 +41,7 @@ pub fn rest_pull_back(
         let corners = hinge.vertices.map(|a| x[a as usize]);
         let multipliers = hinge.vertices.map(|a| lambda[a as usize]);
         let sides = hinge.rest.map(|side| side.map(|v| x_bar[v as usize]));
-        let by_rest = bend::rest_pull_back(sides, cloth.bending, corners, multipliers);
+        let by_rest = bend::rest_pull_back(sides, cloth.rigidity(hinge), corners, multipliers);
         for (v, g) in hinge.rest.iter().flatten().zip(by_rest.iter().flatten()) {
             hat[*v as usize] += g;
         }
@@ -50,7 +58,6 @@ pub fn rest_push_forward(
     delta: &[Vec2],
 ) -> Vec<Vec3> {
     let mut change = vec![Vec3::zeros(); x.len()];
-    let gravity = GRAVITY * (cloth.density / 3.0);
     let still = |v: &[u32]| v.iter().all(|v| delta[*v as usize] == Vec2::zeros());
     for (e, t) in cloth.triangles.iter().enumerate() {
         let at = cloth.rest_triangles[e];
@@ -58,10 +65,14 @@ pub fn rest_push_forward(
             continue;
         }
         let corners = t.map(|a| x[a as usize]);
-        let motion = at.map(|v| delta[v as usize]);
-        let element = &rest.triangles[e];
-        let forces =
-            membrane::rest_push_forward(element, &cloth.elasticity, corners, motion, gravity);
+        let material = cloth.material(e);
+        let forces = membrane::rest_push_forward(
+            &rest.triangles[e],
+            &material.elasticity,
+            corners,
+            material.on_grain(at.map(|v| delta[v as usize])),
+            GRAVITY * (material.density / 3.0),
+        );
         for (a, f) in t.iter().zip(forces) {
             change[*a as usize] += f;
         }
@@ -73,7 +84,7 @@ pub fn rest_push_forward(
         let corners = hinge.vertices.map(|a| x[a as usize]);
         let sides = hinge.rest.map(|side| side.map(|v| x_bar[v as usize]));
         let motion = hinge.rest.map(|side| side.map(|v| delta[v as usize]));
-        let forces = bend::rest_push_forward(sides, cloth.bending, corners, motion);
+        let forces = bend::rest_push_forward(sides, cloth.rigidity(hinge), corners, motion);
         for (a, f) in hinge.vertices.iter().zip(forces) {
             change[*a as usize] += f;
         }

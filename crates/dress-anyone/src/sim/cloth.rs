@@ -1,9 +1,10 @@
-//! What the simulator knows of a garment: its topology and fabric ([`Cloth`]), and what follows
+//! What the simulator knows of a garment: its topology and fabrics ([`Cloth`]), and what follows
 //! from one rest shape x̄ ([`Rest`]).
 
 use super::energy::bend::RestHinge;
-use super::energy::membrane::{Elasticity, RestTriangle};
-use crate::garment::Fabric;
+use super::energy::membrane::RestTriangle;
+use super::material::Material;
+use crate::garment::{Cut, Fabric};
 use crate::geometry::{Vec2, Vec3};
 use crate::pattern::PatternMesh;
 use std::collections::BTreeMap;
@@ -11,7 +12,7 @@ use std::collections::BTreeMap;
 /// Standard gravity \[m/s²\], y up.
 pub const GRAVITY: Vec3 = Vec3::new(0.0, -9.81, 0.0);
 
-/// A garment's topology and fabric: everything that does not change while x̄ does.
+/// A garment's topology and fabrics: everything that does not change while x̄ does.
 #[derive(Clone, Debug)]
 pub struct Cloth {
     /// Pattern vertices of each triangle, counter-clockwise at rest.
@@ -29,12 +30,10 @@ pub struct Cloth {
     pub reference_area: Vec<f64>,
     /// Where the cloth meets the body: its vertices and the middles of its edges.
     pub contacts: Vec<ContactPoint>,
-    /// Membrane stiffness.
-    pub elasticity: Elasticity,
-    /// Bending rigidity \[N·m\].
-    pub bending: f64,
-    /// Areal density \[kg/m²\].
-    pub density: f64,
+    /// What it is made of; every one once.
+    pub materials: Vec<Material>,
+    /// Which of them each triangle is of, `[triangle]`.
+    pub material_of: Vec<u16>,
     /// Vertices kept near a height.
     pub holds: Vec<Hold>,
     /// Cloth vertices of each triangle, right side in front.
@@ -51,6 +50,8 @@ pub struct Hinge {
     pub vertices: [u32; 4],
     /// Pattern vertices (p0, p1, opposite) of each side.
     pub rest: [[u32; 3]; 2],
+    /// The triangle on each side.
+    pub triangles: [u32; 2],
 }
 
 /// A point of the cloth that feels the body: the middle of an edge, or a vertex, which is the middle
@@ -84,8 +85,29 @@ pub struct Hold {
 }
 
 impl Cloth {
-    /// Prepares the meshed pattern for draping in `fabric`.
+    /// Prepares the meshed pattern for draping in `fabric`, every panel on the straight grain.
     pub fn new(mesh: &PatternMesh, fabric: &Fabric) -> Self {
+        let cut = Cut {
+            fabric: *fabric,
+            grain: 0.0,
+        };
+        Self::cut_from(mesh, &vec![cut; mesh.panel_triangles.len()])
+    }
+
+    /// Prepares the meshed pattern for draping, its panels cut from `cuts`, `[panel]`.
+    pub fn cut_from(mesh: &PatternMesh, cuts: &[Cut]) -> Self {
+        let mut materials: Vec<Material> = Vec::new();
+        let mut material_of = vec![0; mesh.triangles.len()];
+        for (cut, triangles) in cuts.iter().zip(&mesh.panel_triangles) {
+            let material = Material::from(cut);
+            let found = materials.iter().position(|known| *known == material);
+            let index = found.unwrap_or(materials.len());
+            if found.is_none() {
+                materials.push(material);
+            }
+            // A pattern has far fewer panels than there are numbers.
+            material_of[triangles.clone()].fill(index as u16);
+        }
         let triangles = mesh.cloth_triangles();
         let mut reference_area = vec![0.0; mesh.cloth_vertex_count];
         for (t, triangle) in triangles.iter().enumerate() {
@@ -101,13 +123,24 @@ impl Cloth {
             sewing: mesh.sewing.clone(),
             vertex_count: mesh.cloth_vertex_count,
             reference_area,
-            elasticity: Elasticity::from(fabric),
-            bending: fabric.bending,
-            density: fabric.density,
+            materials,
+            material_of,
             holds: Vec::new(),
             outward: mesh.outward_triangles(),
             reference: mesh.x_bar.clone(),
         }
+    }
+
+    /// What triangle `t` is made of.
+    pub fn material(&self, t: usize) -> &Material {
+        &self.materials[usize::from(self.material_of[t])]
+    }
+
+    /// Bending rigidity of a hinge \[N·m\]: across a seam of two fabrics the harmonic mean, as of springs
+    /// one after the other.
+    pub fn rigidity(&self, hinge: &Hinge) -> f64 {
+        let [a, b] = hinge.triangles.map(|t| self.material(t as usize).bending);
+        if a == b { a } else { 2.0 * a * b / (a + b) }
     }
 
     /// Corners of triangle `t` in the reference pattern \[m\].
@@ -118,20 +151,18 @@ impl Cloth {
     /// The rest quantities that follow from x̄.
     pub fn at_rest(&self, x_bar: &[Vec2]) -> Rest {
         let at = |t: [u32; 3]| t.map(|v| x_bar[v as usize]);
-        let triangles: Vec<_> = self
-            .rest_triangles
-            .iter()
-            .map(|t| RestTriangle::new(at(*t)))
+        let triangles: Vec<_> = (self.rest_triangles.iter().enumerate())
+            .map(|(t, corners)| RestTriangle::new(self.material(t).on_grain(at(*corners))))
             .collect();
         let hinges = self
             .hinges
             .iter()
-            .map(|hinge| RestHinge::new(hinge.rest.map(at), self.bending))
+            .map(|hinge| RestHinge::new(hinge.rest.map(at), self.rigidity(hinge)))
             .collect();
         let mut mass = vec![0.0; self.vertex_count];
-        for (rest, triangle) in triangles.iter().zip(&self.triangles) {
+        for (t, (rest, triangle)) in triangles.iter().zip(&self.triangles).enumerate() {
             for &a in triangle {
-                mass[a as usize] += self.density * rest.area / 3.0;
+                mass[a as usize] += self.material(t).density * rest.area / 3.0;
             }
         }
         Rest {
@@ -205,6 +236,7 @@ fn hinges(rest: &[[u32; 3]], welded: &[[u32; 3]]) -> Vec<Hinge> {
             hinges.push(Hinge {
                 vertices: [x0, x1, opposite(pair[0]), opposite(pair[1])],
                 rest: [side(pair[0], x0), side(pair[1], x0)],
+                triangles: [pair[0].0 as u32, pair[1].0 as u32],
             });
         }
     }
@@ -226,6 +258,25 @@ pub(crate) mod fixtures {
         bending: 1e-4,
         density: 0.2,
     };
+
+    /// Every other triangle of a stiffer, heavier fabric than [`SOFT`], and on the bias.
+    pub(crate) fn patched(mesh: &PatternMesh) -> Cloth {
+        let mut cloth = Cloth::new(mesh, &SOFT);
+        let patch = Cut {
+            fabric: Fabric {
+                warp: 120.0,
+                bending: 3e-4,
+                density: 0.3,
+                ..SOFT
+            },
+            grain: 35.0,
+        };
+        cloth.materials.push(Material::from(&patch));
+        for of in cloth.material_of.iter_mut().step_by(2) {
+            *of = 1;
+        }
+        cloth
+    }
 
     /// A rectangular panel of staggered triangles, `columns` × `rows` cells of side `h` \[m\].
     pub(crate) fn sheet(columns: usize, rows: usize, h: f64) -> PatternMesh {
@@ -309,6 +360,55 @@ mod tests {
         // 3F = 2E + B over all edges, B the two rims.
         let edges = usize::midpoint(3 * cloth.triangles.len(), 2 * columns);
         assert_eq!(cloth.hinges.len(), edges - 2 * columns);
+    }
+
+    #[test]
+    fn panels_have_the_mass_of_their_fabrics_and_seams_a_mean_of_their_bending() {
+        let mut mesh = fixtures::tube(4, 3, 0.1);
+        let half = mesh.triangles.len() / 2;
+        mesh.panel_triangles = vec![0..half, half..2 * half];
+        let light = Fabric {
+            bending: 1e-5,
+            density: 0.1,
+            ..Fabric::default()
+        };
+        let heavy = Fabric {
+            bending: 3e-5,
+            density: 0.4,
+            ..Fabric::default()
+        };
+        let cuts = [light, heavy, light].map(|fabric| Cut { fabric, grain: 0.0 });
+        let cloth = Cloth::cut_from(&mesh, &cuts[..2]);
+        let mass: f64 = cloth.at_rest(&mesh.x_bar).mass.iter().sum();
+        // Half of 0.4 × 0.3 m of each.
+        assert_relative_eq!(mass, 0.06 * (0.1 + 0.4), max_relative = 1e-12);
+        let mut found: Vec<f64> = cloth.hinges.iter().map(|h| cloth.rigidity(h)).collect();
+        found.sort_by(f64::total_cmp);
+        found.dedup();
+        // Alone, 1/(½/1 + ½/3) across the seam, alone.
+        assert_relative_eq!(&found[..], &[1e-5, 1.5e-5, 3e-5][..], max_relative = 1e-12);
+        // Panels of one fabric share one material.
+        let same = Cloth::cut_from(&mesh, &[cuts[0], cuts[2]]);
+        assert_eq!(same.materials.len(), 1);
+    }
+
+    #[test]
+    fn a_panel_cut_at_an_angle_is_the_turned_panel_on_the_straight_grain() {
+        let mesh = fixtures::sheet(4, 4, 0.1);
+        let (sin, cos) = 0.5_f64.sin_cos();
+        let turned = |p: &Vec2| Vec2::new(cos * p.x + sin * p.y, cos * p.y - sin * p.x);
+        let mut straight = mesh.clone();
+        straight.x_bar = mesh.x_bar.iter().map(turned).collect();
+        // The turned panel has its warp where the other has it half a radian to the left.
+        let cut = Cut {
+            fabric: fixtures::SOFT,
+            grain: 0.5_f64.to_degrees(),
+        };
+        let at_angle = Cloth::cut_from(&mesh, &[cut]).at_rest(&mesh.x_bar);
+        let on_grain = Cloth::new(&straight, &fixtures::SOFT).at_rest(&straight.x_bar);
+        for (a, b) in at_angle.triangles.iter().zip(&on_grain.triangles) {
+            assert_relative_eq!(a.inverse, b.inverse, max_relative = 1e-12, epsilon = 1e-12);
+        }
     }
 
     #[test]

@@ -19,7 +19,7 @@ use super::energy::contact::{ContactParams, Surface};
 use super::layers::Watch;
 use crate::geometry::{Mat3, Vec3};
 use serde::{Deserialize, Serialize};
-use stretch::{Compliance, Stretch, Visit};
+use stretch::{Stretch, Visit};
 use turn::Turn;
 
 /// How to step.
@@ -80,7 +80,6 @@ pub struct Stepper<'a, S> {
     surface: &'a S,
     contact: ContactParams,
     params: StepParams,
-    compliance: Compliance,
     /// 1/m.
     w: Vec<f64>,
     stretch: Stretch,
@@ -135,8 +134,7 @@ impl<'a, S: Surface> Stepper<'a, S> {
     ) -> Self {
         let w = inverse_masses(rest);
         Self {
-            compliance: Compliance::new(&cloth.elasticity, params.dt),
-            stretch: Stretch::new(cloth, rest, &w),
+            stretch: Stretch::new(cloth, rest, &w, params.dt),
             turn: Turn::new(cloth, rest, &w, params.dt),
             w,
             lambda_hold: vec![0.0; cloth.holds.len()],
@@ -202,7 +200,7 @@ impl<'a, S: Surface> Stepper<'a, S> {
                 Some(tape) => (Some(&mut tape.membrane), Some(&mut tape.bend)),
                 None => (None, None),
             };
-            self.stretch.sweep(&self.compliance, &mut state.x, membrane);
+            self.stretch.sweep(&mut state.x, membrane);
             self.turn.sweep(&mut state.x, bend);
             self.sweep_holds(&mut state.x, tape.as_deref_mut());
             self.watch.sweep(&mut apart, &self.w, &mut state.x);

@@ -114,8 +114,9 @@ impl<S: Surface> System<'_, S> {
         for pair in pairs {
             sum += pair.energy(self.thickness, pair.vertices.map(|a| x[a as usize]));
         }
-        for (rest, t) in self.rest.triangles.iter().zip(&self.cloth.triangles) {
-            sum += membrane::energy(rest, &self.cloth.elasticity, t.map(|a| x[a as usize]));
+        for (e, t) in self.cloth.triangles.iter().enumerate() {
+            let (rest, d) = (&self.rest.triangles[e], &self.cloth.material(e).elasticity);
+            sum += membrane::energy(rest, d, t.map(|a| x[a as usize]));
         }
         for (rest, hinge) in self.rest.hinges.iter().zip(&self.cloth.hinges) {
             sum += rest.energy(hinge.vertices.map(|a| x[a as usize]));
@@ -148,8 +149,9 @@ impl<S: Surface> System<'_, S> {
                 }
             }
         }
-        for (rest, t) in self.rest.triangles.iter().zip(&self.cloth.triangles) {
-            let forces = membrane::force(rest, &self.cloth.elasticity, t.map(|a| x[a as usize]));
+        for (e, t) in self.cloth.triangles.iter().enumerate() {
+            let (rest, d) = (&self.rest.triangles[e], &self.cloth.material(e).elasticity);
+            let forces = membrane::force(rest, d, t.map(|a| x[a as usize]));
             for (a, force) in t.iter().zip(forces) {
                 f[*a as usize] += force;
             }
@@ -208,8 +210,8 @@ impl<S: Surface> System<'_, S> {
         }
         for (e, t) in self.cloth.triangles.iter().enumerate() {
             let corners = t.map(|a| x[a as usize]);
-            let rest = &self.rest.triangles[e];
-            let blocks = membrane::stiffness(rest, &self.cloth.elasticity, corners, exactness);
+            let (rest, d) = (&self.rest.triangles[e], &self.cloth.material(e).elasticity);
+            let blocks = membrane::stiffness(rest, d, corners, exactness);
             for (slot, (i, j)) in assembly.triangles[e].iter().zip(PAIRS) {
                 if t[i] >= t[j] {
                     k.add(*slot, &blocks[i][j]);
@@ -283,7 +285,6 @@ impl<S: Surface> System<'_, S> {
 mod tests {
     use super::*;
     use crate::check::{assert_derivative, noise};
-    use crate::garment::Fabric;
     use crate::sim::cloth::{Hold, fixtures};
     use crate::sim::energy::contact::fixtures::Cone;
     use crate::sim::energy::layers::LayerParams;
@@ -292,7 +293,7 @@ mod tests {
     #[test]
     fn force_and_stiffness_are_derivatives_of_the_energy() {
         let mesh = fixtures::tube(10, 4, 0.06);
-        let mut cloth = Cloth::new(&mesh, &Fabric::default());
+        let mut cloth = fixtures::patched(&mesh);
         cloth.holds.push(Hold {
             vertex: 3,
             height: 0.1,

@@ -5,7 +5,7 @@ use super::TransferParams;
 use super::ease::{Ease, EaseAt};
 use super::relax::Stencil;
 use crate::garment::Garment;
-use crate::pattern::Pattern;
+use crate::pattern::names::Names;
 use crate::problem::Problem;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
@@ -50,10 +50,7 @@ impl Layout {
     /// Of a garment, with the zones and kept parts of `params`. All that they name must be there.
     pub fn of(garment: &Garment, params: &TransferParams) -> Result<Self, Vec<Problem>> {
         let mesh = &garment.mesh;
-        let mut names = Names {
-            pattern: &garment.pattern,
-            problems: Vec::new(),
-        };
+        let mut names = Names::new(&garment.pattern);
         let mut ease_of_panel = vec![EaseAt::from(params.ease); garment.pattern.panels.len()];
         for zone in &params.zones {
             for panel in &zone.panels {
@@ -77,8 +74,8 @@ impl Layout {
             }
         }
         for edge in &params.keep_length {
-            for (p, e) in names.edges(edge) {
-                for pair in mesh.edge_vertices[p][e].windows(2) {
+            for id in names.edges(edge, "transfer.keep_length") {
+                for pair in mesh.along(id).windows(2) {
                     keep(pair[0], pair[1]);
                 }
             }
@@ -140,63 +137,11 @@ fn lines(garment: &Garment) -> Vec<Vec<u32>> {
         .collect()
 }
 
-/// Looks names up, and notes those that are not there.
-struct Names<'a> {
-    pattern: &'a Pattern,
-    problems: Vec<Problem>,
-}
-
-impl Names<'_> {
-    fn panel(&mut self, name: &str, place: &str) -> Option<usize> {
-        let found = self.pattern.panel_named(name);
-        if found.is_none() {
-            let names: Vec<String> = (self.pattern.panels.iter())
-                .map(|panel| format!("`{}`", panel.name))
-                .collect();
-            self.problems.push(Problem::at(
-                place,
-                format!("there is no panel `{name}`; there are {}", names.join(", ")),
-            ));
-        }
-        found
-    }
-
-    /// The edges behind "PANEL:EDGE", where EDGE is a number or a label.
-    fn edges(&mut self, text: &str) -> Vec<(usize, usize)> {
-        let place = "transfer.keep_length";
-        let Some((panel, edge)) = text.rsplit_once(':') else {
-            let text = format!("`{text}` must be a panel and an edge, as in `front:2`");
-            self.problems.push(Problem::at(place, text));
-            return Vec::new();
-        };
-        let Some(p) = self.panel(panel, place) else {
-            return Vec::new();
-        };
-        let edges = &self.pattern.panels[p].edges;
-        let numbered = edge.parse::<usize>().ok();
-        let found: Vec<(usize, usize)> = (0..edges.len())
-            .filter(|&e| numbered == Some(e) || edges[e].label.as_deref() == Some(edge))
-            .map(|e| (p, e))
-            .collect();
-        if found.is_empty() {
-            self.problems.push(Problem::at(
-                format!("{place}, panel `{panel}`"),
-                format!(
-                    "there is no edge `{edge}`; edges are 0 to {}, or have one of the labels that \
-                     `dress inspect` tells",
-                    edges.len().saturating_sub(1)
-                ),
-            ));
-        }
-        found
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::fixture::{rectangle, stitch};
-    use crate::pattern::triangulate;
+    use crate::pattern::{Pattern, triangulate};
 
     /// A front and a back, sewn along one side.
     fn garment() -> Garment {

@@ -337,6 +337,30 @@ fn a_misspelt_parameter() {
 }
 
 #[test]
+fn a_fabric_or_a_panel_that_is_not_there() {
+    let place = Workplace::new();
+    let before = place.names();
+    let drape = |fabric| {
+        let line = ["drape", "--garment", "tee.json", "--body", "body.obj"];
+        place.dress(&[&line[..], &["--out", "out", "--fabric", fabric]].concat())
+    };
+    let words = ["felt", "there is no fabric of this name", "denim"];
+    assert_refused(&place, &before, &drape("felt"), &words);
+    assert_refused(&place, &before, &drape("left:felt"), &words);
+    let words = ["tee.json", "no panel `lft`", "`left`, `right`"];
+    assert_refused(&place, &before, &drape("lft:denim"), &words);
+    let refit = place.refit("tee.json", "body.obj", &["--fabric", "lft:denim"]);
+    assert_refused(&place, &before, &refit, &words);
+    let zone = "[[fabric_zones]]\npanels = [\"lft\"]\ngrain = 45\n";
+    place.file("zone.toml", zone);
+    let before = place.names();
+    let bodies = ["--source-body", "body.obj", "--target-body", "body.obj"];
+    let line = ["transfer", "--garment", "tee.json", "--params", "zone.toml"];
+    let transfer = place.dress(&[&line[..], &bodies, &["--out", "out"]].concat());
+    assert_refused(&place, &before, &transfer, &words);
+}
+
+#[test]
 fn a_command_line_that_makes_no_sense() {
     let place = Workplace::new();
     for line in [

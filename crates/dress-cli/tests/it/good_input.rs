@@ -71,6 +71,40 @@ fn a_cloth_laid_on_a_box_is_draped_and_told_of() {
 }
 
 #[test]
+fn panels_are_draped_in_fabrics_of_their_own() {
+    let place = Workplace::new();
+    place.file(
+        "zone.toml",
+        "[[fabric_zones]]\npanels = [\"left\"]\ngrain = 45\n",
+    );
+    let garment = |fabrics: &[&str]| {
+        let line = ["drape", "--garment", "tee.json", "--body", "body.obj"];
+        let more = [
+            "--resolution",
+            "35",
+            "--out",
+            "out",
+            "--params",
+            "zone.toml",
+        ];
+        let ran = place.dress(&[&line[..], &more, fabrics].concat());
+        assert_eq!(ran.code, 0, "{}", ran.stderr);
+        std::fs::read(place.path("out/garment.obj")).unwrap()
+    };
+    let plain = garment(&[]);
+    let denim = garment(&["--fabric", "denim"]);
+    let both = garment(&["--fabric", "denim", "--fabric", "left:rib-knit"]);
+    assert!(plain != denim && denim != both && plain != both);
+    let zones = &report(&place)["parameters"]["fabric_zones"];
+    // As the library of fabrics has rib-knit.
+    assert_eq!(zones[1]["fabric"]["density"], 0.276);
+    assert_eq!(
+        (&zones[0]["grain"], &zones[1]["panels"][0]),
+        (&45.0.into(), &"left".into())
+    );
+}
+
+#[test]
 fn a_garment_carried_to_the_body_it_fits_stays_as_it_was() {
     let place = Workplace::new();
     let bodies = ["--source-body", "body.obj", "--target-body", "body.obj"];

@@ -162,17 +162,21 @@ pub(super) fn in_place<'b>(
 }
 
 /// The elements of each block and how many of them count, by colours: pieces of one colour share no
-/// vertex. Blocks that a colour does not fill repeat their first element.
+/// vertex, and those of a block are of one `kind`. Blocks that are not full repeat their first element.
 pub(super) fn blocks<const K: usize>(
     pieces: &[[u32; K]],
     vertex_count: usize,
+    kind: impl Fn(u32) -> u16,
 ) -> Vec<([u32; LANES], usize)> {
     let mut blocks = Vec::new();
-    for colour in colours(pieces, vertex_count) {
-        for elements in colour.chunks(LANES) {
-            let mut block = [elements[0]; LANES];
-            block[..elements.len()].copy_from_slice(elements);
-            blocks.push((block, elements.len()));
+    for mut colour in colours(pieces, vertex_count) {
+        colour.sort_by_key(|e| kind(*e));
+        for alike in colour.chunk_by(|a, b| kind(*a) == kind(*b)) {
+            for elements in alike.chunks(LANES) {
+                let mut block = [elements[0]; LANES];
+                block[..elements.len()].copy_from_slice(elements);
+                blocks.push((block, elements.len()));
+            }
         }
     }
     blocks
@@ -218,8 +222,9 @@ mod tests {
         let strip: Vec<[u32; 3]> = (0..400).map(|i| [i, i + 1, i + 2]).collect();
         for pieces in [strip, fan(200)] {
             let mut seen = BTreeSet::new();
-            for (elements, count) in blocks(&pieces, 402) {
+            for (elements, count) in blocks(&pieces, 402, |e| u16::from(e > 50)) {
                 let live = &elements[..count];
+                assert!(elements.iter().all(|e| (*e > 50) == (elements[0] > 50)));
                 let vertices: BTreeSet<u32> =
                     live.iter().flat_map(|e| pieces[*e as usize]).collect();
                 assert_eq!(vertices.len(), 3 * count);

@@ -107,7 +107,10 @@ impl<S: Surface> Stepper<'_, S> {
     fn pull_back_membrane(&self, tape: &Tape, sweep: usize, back: &mut Back<'_>) {
         let order = self.stretch.order();
         let visits = &tape.membrane[sweep * order.len()..];
-        let compliance = inverse(&self.cloth.elasticity) / (self.params.dt * self.params.dt);
+        let per_time = 1.0 / (self.params.dt * self.params.dt);
+        let compliances: Vec<Mat3> = (self.cloth.materials.iter())
+            .map(|material| inverse(&material.elasticity) * per_time)
+            .collect();
         for (e, visit) in order.iter().zip(visits).rev() {
             let Some((f, delta)) = visit else {
                 continue;
@@ -117,6 +120,7 @@ impl<S: Surface> Stepper<'_, S> {
             let at = self.cloth.triangles[e].map(|a| a as usize);
             let w = at.map(|a| self.w[a]);
             let b = rest.gradients();
+            let compliance = compliances[usize::from(self.cloth.material_of[e])];
             let alpha_tilde = compliance / rest.area;
             let b_squared = rest.weighted(w);
             let system = alpha_tilde + constraint_mass(f, &b_squared);
@@ -309,9 +313,13 @@ impl RestHat {
         for (e, t) in cloth.triangles.iter().enumerate() {
             let by_mass = |a: usize| -self.w[a] / (rest.mass[a] * rest.mass[a]);
             let masses: f64 = t.iter().map(|a| by_mass(*a as usize)).sum();
-            let area = self.area[e] + cloth.density / 3.0 * masses;
+            let material = cloth.material(e);
+            let area = self.area[e] + material.density / 3.0 * masses;
             let corners = rest.triangles[e].pull_back(&self.inverse[e], area);
-            for (v, g) in cloth.rest_triangles[e].iter().zip(corners) {
+            for (v, g) in cloth.rest_triangles[e]
+                .iter()
+                .zip(material.off_grain(corners))
+            {
                 hat[*v as usize] += g;
             }
         }

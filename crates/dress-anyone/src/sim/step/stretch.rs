@@ -14,13 +14,14 @@ use super::lanes::{
 use crate::geometry::Vec3;
 use crate::sim::cloth::{Cloth, Rest};
 use crate::sim::energy::membrane::{Elasticity, Mat3x2};
+use crate::sim::material::Material;
 
 /// Compliance 𝔻⁻¹ Δt⁻² per rest area: weft, coupling, warp, shear.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Compliance([f64; 4]);
+struct Compliance([f64; 4]);
 
 impl Compliance {
-    pub(super) fn new(d: &Elasticity, dt: f64) -> Self {
+    fn new(d: &Elasticity, dt: f64) -> Self {
         let determinant = d.weft * d.warp - d.coupling * d.coupling;
         let entries = [
             d.warp / determinant,
@@ -37,18 +38,21 @@ pub(super) type Visit = Option<(Mat3x2, Vec3)>;
 
 /// The triangles of a cloth by colours, with one rest shape.
 pub(super) struct Stretch {
+    /// Of each material.
+    compliances: Vec<Compliance>,
     blocks: Vec<Block>,
     /// Triangles in the order of their visits.
     order: Vec<u32>,
 }
 
-/// [`LANES`] triangles that share no vertex.
+/// [`LANES`] triangles of one material that share no vertex.
 #[derive(Clone, Debug, Default)]
 struct Block {
     triangles: [u32; LANES],
     corners: [[u32; LANES]; 3],
     /// How many of them count; the others repeat the first.
     count: usize,
+    material: u16,
     /// Hat functions b of corners 1 and 2: (u, v) of each.
     b: [[Lane; 2]; 2],
     w: Lane3,
@@ -59,22 +63,26 @@ struct Block {
 }
 
 impl Stretch {
-    pub(super) fn new(cloth: &Cloth, rest: &Rest, w: &[f64]) -> Self {
+    pub(super) fn new(cloth: &Cloth, rest: &Rest, w: &[f64], dt: f64) -> Self {
         let block = |(triangles, count): ([u32; LANES], usize)| {
             let at = |corner: usize| triangles.map(|e| cloth.triangles[e as usize][corner]);
             Block {
                 triangles,
                 count,
+                material: cloth.material_of[triangles[0] as usize],
                 corners: [at(0), at(1), at(2)],
                 ..Block::default()
             }
         };
-        let blocks: Vec<Block> = blocks(&cloth.triangles, cloth.vertex_count)
+        let material = |e: u32| cloth.material_of[e as usize];
+        let blocks: Vec<Block> = blocks(&cloth.triangles, cloth.vertex_count, material)
             .into_iter()
             .map(block)
             .collect();
         let live = |block: &Block| block.triangles.into_iter().take(block.count);
+        let compliance = |material: &Material| Compliance::new(&material.elasticity, dt);
         let mut stretch = Self {
+            compliances: cloth.materials.iter().map(compliance).collect(),
             order: blocks.iter().flat_map(live).collect(),
             blocks,
         };
@@ -123,16 +131,12 @@ impl Stretch {
     }
 
     /// Visits every triangle once, and notes the visits on `tape`.
-    pub(super) fn sweep(
-        &mut self,
-        compliance: &Compliance,
-        x: &mut [Vec3],
-        mut tape: Option<&mut Vec<Visit>>,
-    ) {
+    pub(super) fn sweep(&mut self, x: &mut [Vec3], mut tape: Option<&mut Vec<Visit>>) {
         pulp::Arch::new().dispatch(
             #[inline(always)]
             || {
                 for block in &mut self.blocks {
+                    let compliance = &self.compliances[usize::from(block.material)];
                     let visit = block.visit(compliance, x);
                     if let Some(tape) = &mut tape {
                         tape.extend((0..block.count).map(|l| visit.of_lane(l)));
@@ -240,7 +244,7 @@ mod tests {
     use super::*;
     use crate::check::noise;
     use crate::geometry::Mat3;
-    use crate::sim::cloth::fixtures::{SOFT, tube};
+    use crate::sim::cloth::fixtures::{patched, tube};
     use crate::sim::energy::membrane::{constraint, constraint_gradient, constraint_mass};
     use crate::sim::step::solve_symmetric;
 
@@ -254,7 +258,7 @@ mod tests {
         x: &mut [Vec3],
         dt: f64,
     ) {
-        let (t, d) = (cloth.triangles[e], &cloth.elasticity);
+        let (t, d) = (cloth.triangles[e], &cloth.material(e).elasticity);
         let rest = &rest.triangles[e];
         let stiffness = Mat3::new(
             d.weft, d.coupling, 0.0, d.coupling, d.warp, 0.0, 0.0, 0.0, d.shear,
@@ -275,7 +279,7 @@ mod tests {
     #[test]
     fn lanes_do_what_the_constraint_says() {
         let mesh = tube(11, 5, 0.05);
-        let cloth = Cloth::new(&mesh, &SOFT);
+        let cloth = patched(&mesh);
         let rest = cloth.at_rest(&mesh.x_bar);
         let w: Vec<f64> = rest.mass.iter().map(|m| 1.0 / m).collect();
         let dt = 0.01;
@@ -283,12 +287,11 @@ mod tests {
             .map(|i| Vec3::from_fn(|c, _| 0.3 * noise(3 * i + c)))
             .collect();
         let mut expected = x.clone();
-        let mut stretch = Stretch::new(&cloth, &rest, &w);
+        let mut stretch = Stretch::new(&cloth, &rest, &w, dt);
         let mut lambda = vec![Vec3::zeros(); cloth.triangles.len()];
         let mut tape = Vec::new();
         for _ in 0..3 {
-            let compliance = Compliance::new(&cloth.elasticity, dt);
-            stretch.sweep(&compliance, &mut x, Some(&mut tape));
+            stretch.sweep(&mut x, Some(&mut tape));
             for &e in stretch.order() {
                 let e = e as usize;
                 scalar(&cloth, &rest, &w, e, &mut lambda[e], &mut expected, dt);

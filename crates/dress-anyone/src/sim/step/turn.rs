@@ -46,7 +46,7 @@ impl Turn {
                 ..Block::default()
             }
         };
-        let blocks: Vec<Block> = blocks(&vertices, cloth.vertex_count)
+        let blocks: Vec<Block> = blocks(&vertices, cloth.vertex_count, |_| 0)
             .into_iter()
             .map(block)
             .collect();

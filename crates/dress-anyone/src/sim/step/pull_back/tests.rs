@@ -144,14 +144,22 @@ fn a_step_that_stretches_has_an_exact_adjoint() {
 }
 
 #[test]
+fn a_step_of_two_fabrics_off_the_grain_has_an_exact_adjoint() {
+    let mesh = fixtures::sheet(2, 2, 0.1);
+    let cloth = fixtures::patched(&mesh);
+    check(&mesh, &cloth, &Nothing, three_sweeps(), &crumpled(&mesh));
+}
+
+#[test]
 fn a_step_that_bends_has_an_exact_adjoint() {
     let mesh = fixtures::sheet(1, 1, 0.1);
     let mut cloth = Cloth::new(&mesh, &SOFT);
-    cloth.bending = 0.1;
-    cloth.elasticity.weft *= 1e-6;
-    cloth.elasticity.warp *= 1e-6;
-    cloth.elasticity.coupling *= 1e-6;
-    cloth.elasticity.shear *= 1e-6;
+    let material = &mut cloth.materials[0];
+    material.bending = 0.1;
+    material.elasticity.weft *= 1e-6;
+    material.elasticity.warp *= 1e-6;
+    material.elasticity.coupling *= 1e-6;
+    material.elasticity.shear *= 1e-6;
     check(&mesh, &cloth, &Nothing, three_sweeps(), &crumpled(&mesh));
 }
 

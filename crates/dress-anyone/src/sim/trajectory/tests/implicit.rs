@@ -143,8 +143,8 @@ impl<S: Surface> Setting<'_, S> {
                 .map(|a| -impulses[a].dot(&force[a]) / rest.mass[a])
                 .collect();
             for (e, t) in cloth.triangles.iter().enumerate() {
-                let area =
-                    cloth.density / 3.0 * t.iter().map(|a| by_mass[*a as usize]).sum::<f64>();
+                let area = cloth.material(e).density / 3.0
+                    * t.iter().map(|a| by_mass[*a as usize]).sum::<f64>();
                 let corners = rest.triangles[e].pull_back(&Mat2::zeros(), area);
                 for (v, g) in cloth.rest_triangles[e].iter().zip(corners) {
                     hat[*v as usize] += g;
