@@ -83,6 +83,10 @@ pub struct Fabric {
     pub bending: f64,
     /// Mass per area \[kg/m²\]. 0.1 light, 0.4 heavy.
     pub density: f64,
+    /// Thickness \[m\]. 1e-4 chiffon, 3e-3 fleece.
+    pub thickness: f64,
+    /// Coulomb's coefficient on the body \[–\]. 0.2 smooth, 0.5 rough.
+    pub friction: f64,
 }
 
 impl Default for Fabric {
@@ -96,6 +100,8 @@ impl Default for Fabric {
             shear: 1000.0 / 2.6,
             bending: 1e-5,
             density: 0.2,
+            thickness: 5e-4,
+            friction: 0.4,
         }
     }
 }

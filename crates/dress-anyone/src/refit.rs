@@ -169,7 +169,7 @@ fn does_not_rest(body: &str, status: RestStatus, residual: f64) -> String {
             "the garment slides off the body `{body}`: nothing holds it. Label the edges of its \
              waist or neckline (`lower_interface`), name their labels in the parameter \
              `hold.labels`, hold its upper rim (`hold.rim`), or let friction hold it \
-             (`sim.contact.friction`, say 0.4)"
+             (`sim.contact.friction`, say 0.4, or \"fabric\")"
         ),
         RestStatus::NotFinite => format!(
             "the drape on the body `{body}` broke down (positions are no longer numbers). Check \

@@ -2,6 +2,7 @@
 
 use crate::geometry::quality::QualitySummary;
 use crate::loss::LossTerms;
+use crate::sim::OrFabric;
 use crate::sim::equilibrium::RestStatus;
 use serde::{Deserialize, Serialize};
 
@@ -55,8 +56,8 @@ pub struct DrapeReport {
     pub status: RestStatus,
     /// ‖f‖/(‖m‖|g|).
     pub residual: f64,
-    /// Coulomb's coefficient of cloth on the body \[–\].
-    pub friction: f64,
+    /// Coulomb's coefficient of cloth on the body \[–\], or "fabric" for the fabrics' own.
+    pub friction: OrFabric,
     /// Deepest cloth vertex inside the body's mesh \[m\]; 0 when none is.
     pub deepest_penetration: f64,
     /// Cloth vertices inside the body's mesh.

@@ -21,6 +21,6 @@ pub mod trajectory;
 pub use cloth::{Cloth, Hold, Rest};
 pub use differentiable::Differentiable;
 pub use drape::{Drape, Scene, SimParams, Solver, Start, drape};
-pub use material::Material;
+pub use material::{Material, OrFabric};
 pub use system::Assembly;
 pub use trajectory::Trajectory;

@@ -44,6 +44,8 @@ pub enum Command {
     /// Draw, show, pose, measure and fit bodies.
     #[command(subcommand)]
     Body(BodyCommand),
+    /// List the fabrics that are known by name, or tell where the numbers of one come from.
+    Fabrics(FabricsArguments),
     /// Print all parameters with their defaults and what they do, as TOML.
     Params,
 }
@@ -139,6 +141,14 @@ pub struct InspectArguments {
     /// How to read the file.
     #[command(flatten)]
     pub reading: ReadingArguments,
+}
+
+/// `dress fabrics`.
+#[derive(Debug, Args)]
+pub struct FabricsArguments {
+    /// A fabric's name [default: all of them]
+    #[arg(value_name = "NAME")]
+    pub name: Option<String>,
 }
 
 /// How to run.

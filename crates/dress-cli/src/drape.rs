@@ -92,10 +92,10 @@ pub fn run(arguments: &DrapeArguments) -> Result<String, Failure> {
     } else {
         summary::rest(report.drape.status).to_owned()
     };
-    let held = if found.friction > refit.sim.contact.friction {
-        format!("Without friction it slides; {} holds it.\n", found.friction)
-    } else {
+    let held = if found.friction == refit.sim.contact.friction {
         String::new()
+    } else {
+        format!("Without friction it slides; {} holds it.\n", found.friction)
     };
     Ok(format!(
         "The drape is {ending} after {seconds:.1} s.\n{held}{}Written to {}\n",

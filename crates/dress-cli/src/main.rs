@@ -14,6 +14,7 @@ mod check_gradient;
 mod checkpoint;
 mod correspond;
 mod drape;
+mod fabrics;
 mod failure;
 mod fitting;
 mod inputs;
@@ -74,6 +75,7 @@ fn run(command: &Command) -> Result<String, Failure> {
         }
         Command::Body(command) => body::run(command),
         Command::Inspect(arguments) => inspect::run(arguments),
+        Command::Fabrics(arguments) => fabrics::run(arguments),
         Command::Params => Ok(params::TEMPLATE.to_owned()),
     }
 }

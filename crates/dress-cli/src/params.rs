@@ -54,12 +54,13 @@ pub const TEMPLATE: &str = include_str!("params.toml");
 const LIMIT: u64 = MEBIBYTE;
 
 /// Numbers that must be above zero: others may be zero, and none is negative.
-const POSITIVE: [&str; 14] = [
+const POSITIVE: [&str; 15] = [
     "read.resolution",
     "fabric.warp",
     "fabric.weft",
     "fabric.shear",
     "fabric.density",
+    "fabric.thickness",
     "sim.contact.stiffness",
     "sim.layers.thickness",
     "sim.layers.stiffness",

@@ -157,7 +157,6 @@ fn of_size(criterion: &mut Criterion<CpuTime>, size: usize) -> Vec<summary::Row>
         rest: &rest,
         surface: &surface,
         contact: params.contact,
-        thickness: params.layers.thickness,
         grips: &[],
     };
     group.bench_function("stiffness", |b| {

@@ -11,7 +11,7 @@ use crate::geometry::Vec3;
 use crate::pattern::{Edge, EdgeId};
 use crate::sim::drape::DrapeProgress;
 use crate::sim::equilibrium::RestStatus;
-use crate::sim::{Assembly, Cloth, Drape, Hold, Scene, SimParams, Start, drape};
+use crate::sim::{Assembly, Cloth, Drape, Hold, OrFabric, Scene, SimParams, Start, drape};
 pub use placed::lift;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -35,7 +35,7 @@ pub struct HoldParams {
     /// Coulomb's coefficient of cloth on the body with which a garment is draped again that slides off
     /// without friction \[–\]; 0 lets it slide. Textiles on skin have 0.2 to 0.6 (Derler & Gerhardt
     /// 2012).
-    pub friction: f64,
+    pub friction: OrFabric,
 }
 
 impl Default for HoldParams {
@@ -45,7 +45,7 @@ impl Default for HoldParams {
             stiffness: 1e4,
             carried: 0.15,
             rim: false,
-            friction: 0.4,
+            friction: OrFabric::Fabric,
         }
     }
 }
@@ -131,7 +131,7 @@ pub fn drape_on(
             ..hold.clone()
         };
         drape(&rim, &patient)
-    } else if sim.contact.friction < hold.friction {
+    } else if !sim.contact.rubs() && hold.friction != OrFabric::Number(0.0) {
         patient.contact.friction = hold.friction;
         drape(hold, &patient)
     } else {

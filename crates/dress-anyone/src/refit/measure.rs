@@ -14,9 +14,9 @@ use crate::report::{
     DrapeReport, Iteration, MirrorReport, PanelReport, PatternQuality, Report, SeamReport,
     StageTime, Status,
 };
-use crate::sim::Drape;
 use crate::sim::energy::membrane::RestTriangle;
 use crate::sim::equilibrium::RestStatus;
+use crate::sim::{Drape, OrFabric};
 
 /// Everything measured.
 pub(super) struct Measured<'a> {
@@ -140,7 +140,7 @@ pub fn drape_report(
     DrapeReport {
         status: drape.map_or(RestStatus::AtRest, |d| d.status),
         residual: drape.map_or(0.0, |d| d.residual),
-        friction: drape.map_or(0.0, |d| d.friction),
+        friction: drape.map_or(OrFabric::Number(0.0), |d| d.friction),
         deepest_penetration: depths.iter().copied().fold(0.0, f64::max),
         vertices_inside: depths.iter().filter(|d| **d > 0.0).count(),
         through_body: intersections::between(x, &cloth, y, skin).len(),

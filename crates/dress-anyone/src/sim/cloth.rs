@@ -1,6 +1,9 @@
 //! What the simulator knows of a garment: its topology and fabrics ([`Cloth`]), and what follows
 //! from one rest shape x̄ ([`Rest`]).
 
+#[cfg(test)]
+pub(crate) mod fixtures;
+
 use super::energy::bend::RestHinge;
 use super::energy::membrane::RestTriangle;
 use super::material::Material;
@@ -28,6 +31,8 @@ pub struct Cloth {
     /// Area of each cloth vertex in the reference pattern \[m²\]; constant, so that contact
     /// stiffness has no derivative by x̄.
     pub reference_area: Vec<f64>,
+    /// Thickness of each cloth vertex \[m\]: the mean of the fabrics about it.
+    pub thickness: Vec<f64>,
     /// Where the cloth meets the body: its vertices and the middles of its edges.
     pub contacts: Vec<ContactPoint>,
     /// What it is made of; every one once.
@@ -62,6 +67,8 @@ pub struct ContactPoint {
     pub ends: [u32; 2],
     /// Its part of the reference pattern's area \[m²\].
     pub area: f64,
+    /// Coulomb's coefficient on the body \[–\]: the mean of the fabrics about it.
+    pub friction: f64,
 }
 
 impl ContactPoint {
@@ -110,14 +117,23 @@ impl Cloth {
         }
         let triangles = mesh.cloth_triangles();
         let mut reference_area = vec![0.0; mesh.cloth_vertex_count];
+        let mut thickness = vec![0.0; mesh.cloth_vertex_count];
         for (t, triangle) in triangles.iter().enumerate() {
-            for &a in triangle {
-                reference_area[a as usize] += mesh.rest_area(t, &mesh.x_bar) / 3.0;
+            let material = &materials[usize::from(material_of[t])];
+            for a in triangle.map(|a| a as usize) {
+                let area = mesh.rest_area(t, &mesh.x_bar) / 3.0;
+                reference_area[a] += area;
+                thickness[a] += area * material.thickness;
             }
         }
+        for (thickness, area) in thickness.iter_mut().zip(&reference_area) {
+            *thickness /= area;
+        }
+        let friction = |t: usize| materials[usize::from(material_of[t])].friction;
         Self {
             hinges: hinges(&mesh.triangles, &triangles),
-            contacts: contact_points(mesh, &triangles),
+            contacts: contact_points(mesh, &triangles, friction),
+            thickness,
             rest_triangles: mesh.triangles.clone(),
             triangles,
             sewing: mesh.sewing.clone(),
@@ -193,18 +209,32 @@ impl Rest {
 
 /// Vertices and edge middles with the areas that integrate over every triangle cut in four: each
 /// vertex has a quarter of a third of a triangle's area, each middle a quarter of it.
-fn contact_points(mesh: &PatternMesh, welded: &[[u32; 3]]) -> Vec<ContactPoint> {
-    let mut areas: BTreeMap<[u32; 2], f64> = BTreeMap::new();
+fn contact_points(
+    mesh: &PatternMesh,
+    welded: &[[u32; 3]],
+    friction: impl Fn(usize) -> f64,
+) -> Vec<ContactPoint> {
+    // Area, and friction times area.
+    let mut sums: BTreeMap<[u32; 2], [f64; 2]> = BTreeMap::new();
     for (t, triangle) in welded.iter().enumerate() {
         let area = mesh.rest_area(t, &mesh.x_bar);
+        let mut add = |ends, area| {
+            let sum = sums.entry(ends).or_default();
+            sum[0] += area;
+            sum[1] += area * friction(t);
+        };
         for corner in 0..3 {
             let (a, b) = (triangle[corner], triangle[(corner + 1) % 3]);
-            *areas.entry([a, a]).or_insert(0.0) += area / 12.0;
-            *areas.entry([a.min(b), a.max(b)]).or_insert(0.0) += area / 4.0;
+            add([a, a], area / 12.0);
+            add([a.min(b), a.max(b)], area / 4.0);
         }
     }
-    let point = |(ends, area)| ContactPoint { ends, area };
-    areas.into_iter().map(point).collect()
+    let point = |(ends, [area, sum]): ([u32; 2], [f64; 2])| ContactPoint {
+        ends,
+        area,
+        friction: sum / area,
+    };
+    sums.into_iter().map(point).collect()
 }
 
 /// The interior edges of the welded mesh; an edge of more than two triangles gets one hinge per
@@ -241,111 +271,6 @@ fn hinges(rest: &[[u32; 3]], welded: &[[u32; 3]]) -> Vec<Hinge> {
         }
     }
     hinges
-}
-
-#[cfg(test)]
-pub(crate) mod fixtures {
-    //! Small cloths shared by the tests of the simulator.
-
-    use super::*;
-
-    /// Unlike along warp and weft, and softer than most: small forces show.
-    pub(crate) const SOFT: Fabric = Fabric {
-        warp: 50.0,
-        weft: 80.0,
-        poisson: 0.2,
-        shear: 20.0,
-        bending: 1e-4,
-        density: 0.2,
-    };
-
-    /// Every other triangle of a stiffer, heavier fabric than [`SOFT`], and on the bias.
-    pub(crate) fn patched(mesh: &PatternMesh) -> Cloth {
-        let mut cloth = Cloth::new(mesh, &SOFT);
-        let patch = Cut {
-            fabric: Fabric {
-                warp: 120.0,
-                bending: 3e-4,
-                density: 0.3,
-                ..SOFT
-            },
-            grain: 35.0,
-        };
-        cloth.materials.push(Material::from(&patch));
-        for of in cloth.material_of.iter_mut().step_by(2) {
-            *of = 1;
-        }
-        cloth
-    }
-
-    /// A rectangular panel of staggered triangles, `columns` × `rows` cells of side `h` \[m\].
-    pub(crate) fn sheet(columns: usize, rows: usize, h: f64) -> PatternMesh {
-        let mut x_bar = Vec::new();
-        let mut triangles = Vec::new();
-        for j in 0..=rows {
-            for i in 0..=columns {
-                x_bar.push(Vec2::new(h * i as f64, h * j as f64));
-            }
-        }
-        let at = |i: usize, j: usize| (j * (columns + 1) + i) as u32;
-        for j in 0..rows {
-            for i in 0..columns {
-                let [a, b, c, d] = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
-                // Diagonals alternate, so that no direction is favoured.
-                if (i + j) % 2 == 0 {
-                    triangles.extend([[a, b, c], [a, c, d]]);
-                } else {
-                    triangles.extend([[a, b, d], [b, c, d]]);
-                }
-            }
-        }
-        let count = x_bar.len();
-        PatternMesh {
-            panel_vertices: std::iter::once(0..count).collect(),
-            panel_triangles: std::iter::once(0..triangles.len()).collect(),
-            right_side_up: vec![true],
-            edge_vertices: vec![vec![
-                (0..=columns).map(|i| at(i, 0)).collect(),
-                (0..=rows).map(|j| at(columns, j)).collect(),
-                (0..=columns).rev().map(|i| at(i, rows)).collect(),
-                (0..=rows).rev().map(|j| at(0, j)).collect(),
-            ]],
-            sewing: (0..count as u32).collect(),
-            cloth_vertex_count: count,
-            x_bar,
-            triangles,
-        }
-    }
-
-    /// The sheet with its left side sewn to its right side: a tube about the y axis.
-    pub(crate) fn tube(columns: usize, rows: usize, h: f64) -> PatternMesh {
-        let mut mesh = sheet(columns, rows, h);
-        let mut next = 0;
-        for v in 0..mesh.x_bar.len() {
-            let column = v % (columns + 1);
-            mesh.sewing[v] = if column == columns {
-                mesh.sewing[v - columns]
-            } else {
-                next += 1;
-                next - 1
-            };
-        }
-        mesh.cloth_vertex_count = next as usize;
-        mesh
-    }
-
-    /// The tube's cloth vertices on a cylinder of radius `r` \[m\] about the y axis.
-    pub(crate) fn rolled(mesh: &PatternMesh, width: f64, r: f64) -> Vec<Vec3> {
-        let flat: Vec<Vec3> = mesh
-            .x_bar
-            .iter()
-            .map(|p| {
-                let angle = std::f64::consts::TAU * p.x / width;
-                Vec3::new(r * angle.sin(), p.y, r * angle.cos())
-            })
-            .collect();
-        mesh.sew(&flat)
-    }
 }
 
 #[cfg(test)]

@@ -6,6 +6,7 @@ use super::energy::friction::Grip;
 use super::energy::layers::LayerParams;
 use super::equilibrium::{self, EquilibriumParams, RestStatus, Touch};
 use super::layers::{Layers, Watch};
+use super::material::OrFabric;
 use super::step::{State, StepParams, Stepper};
 use super::system::{Assembly, System};
 use crate::geometry::{Vec2, Vec3};
@@ -84,7 +85,7 @@ pub struct Drape {
     /// How the search ended.
     pub status: RestStatus,
     /// Coulomb's coefficient of cloth on the body \[–\].
-    pub friction: f64,
+    pub friction: OrFabric,
     pub(super) rest: Rest,
     pub(super) layers: Layers,
     /// Friction of each contact point; none without friction.
@@ -137,7 +138,7 @@ pub fn drape<S: Surface>(
     let mut layers = Layers::new(scene.cloth, params.layers, &x);
     let touch = Touch::at(scene.cloth, &mut layers, &x, scene.assembly.clone());
     let mut grips = Vec::new();
-    if params.contact.friction > 0.0 {
+    if params.contact.rubs() {
         grips.resize(scene.cloth.contacts.len(), Grip::default());
     }
     let mut drape = Drape {
@@ -206,7 +207,8 @@ impl Drape {
         let contact = &scene.params.contact;
         for (grip, point) in self.grips.iter_mut().zip(&scene.cloth.contacts) {
             let at = [contact.stiffness * point.area, contact.thickness];
-            grip.look(scene.surface, contact.friction, at, point.at(&self.x));
+            let mu = contact.friction.or(point.friction);
+            grip.look(scene.surface, mu, at, point.at(&self.x));
         }
     }
 }
@@ -221,7 +223,6 @@ pub(super) fn system<'a, S>(
         rest,
         surface: scene.surface,
         contact: scene.params.contact,
-        thickness: scene.params.layers.thickness,
         grips,
     }
 }

@@ -105,15 +105,14 @@ impl Touch {
     /// Couples all pairs that touch at `x`. Those that nearly touch are taken in along with them,
     /// so that the structure lasts for a while.
     fn make_room(&mut self, cloth: &Cloth, layers: &mut Layers, x: &[Vec3]) {
-        let h = layers.thickness();
         let touches = |pair: &Pair| {
             let corners = pair.vertices.map(|a| x[a as usize]);
-            pair.closest(corners).r.norm() < h
+            pair.closest(corners).r.norm() < pair.h
         };
         let room = |pair: &Pair| !touches(pair) || self.assembly.couples(pair);
         if !self.pairs.iter().all(room) {
             let still = vec![Vec3::zeros(); x.len()];
-            let near = layers.pairs(x, &still, SPARE * h);
+            let near = layers.pairs(x, &still, SPARE * layers.thickness());
             self.assembly = Assembly::coupling(cloth, &near);
         }
     }

@@ -14,7 +14,7 @@ mod stepping;
 mod untangle;
 
 use super::cloth::Cloth;
-use super::energy::layers::{Kind, LayerParams, Pair};
+use super::energy::layers::{Kind, LEAST_THICKNESS, LayerParams, Pair};
 use crate::geometry::box_tree::{Aabb, BoxTree, around};
 use crate::geometry::{Vec3, intersections};
 use std::collections::BTreeMap;
@@ -29,6 +29,9 @@ pub struct Layers {
     /// Contact stiffness \[N/m\] of each vertex and each edge.
     vertex_kappa: Vec<f64>,
     edge_kappa: Vec<f64>,
+    /// Distance at which layers begin to feel each other \[m\]: at each vertex, and the largest.
+    thickness: Vec<f64>,
+    thickest: f64,
     /// Squared reference lengths of the edges \[m²\].
     squared_lengths: Vec<f64>,
     /// Corners opposite to each edge; of an edge of more than two triangles the last two.
@@ -83,6 +86,9 @@ impl Layers {
             }
         }
         let kappa = |area: &f64| params.stiffness * area;
+        let own = |t: &f64| params.thickness.or(t.max(LEAST_THICKNESS));
+        let thickness: Vec<f64> = cloth.thickness.iter().map(own).collect();
+        let thickest = thickness.iter().copied().fold(0.0, f64::max);
         let mut layers = Self {
             params,
             triangles: cloth.triangles.clone(),
@@ -91,8 +97,10 @@ impl Layers {
             squared_lengths: edges.values().map(|side| side.squared_length).collect(),
             beside: edges.values().map(|side| side.beside).collect(),
             edges: edges.into_keys().collect(),
-            close: close(cloth, 2.0 * params.thickness),
+            close: close(cloth, 2.0 * thickest),
             tangled: vec![false; cloth.vertex_count],
+            thickness,
+            thickest,
             vertex_tree: BoxTree::new(&[]),
             triangle_tree: BoxTree::new(&[]),
             edge_tree: BoxTree::new(&[]),
@@ -108,9 +116,9 @@ impl Layers {
         layers
     }
 
-    /// Distance at which layers begin to feel each other \[m\].
+    /// Largest distance at which layers begin to feel each other \[m\].
     pub fn thickness(&self) -> f64 {
-        self.params.thickness
+        self.thickest
     }
 
     /// Whether layers go through each other anywhere.
@@ -131,7 +139,7 @@ impl Layers {
                 at[v as usize] = true;
             }
         }
-        let stuck = STUCK * self.params.thickness;
+        let stuck = STUCK * self.thickest;
         let still = vec![Vec3::zeros(); x.len()];
         for pair in self.search(x, &still, stuck) {
             for v in pair.vertices {
@@ -158,7 +166,7 @@ impl Layers {
         }
         // What all cloth does alike brings no pieces closer.
         let d = without_mean(d);
-        let reach = self.params.thickness + spare;
+        let reach = self.thickest + spare;
         if !self.near.serves(x, &d, spare) {
             let farthest = d.iter().map(Vec3::norm).fold(0.0, f64::max);
             let room = (MOVES_OF_ROOM * farthest).max(0.5 * self.most_room());
@@ -180,7 +188,7 @@ impl Layers {
     /// neighbours' neighbours.
     fn most_room(&self) -> f64 {
         let lengths: f64 = self.squared_lengths.iter().map(|l| l.sqrt()).sum();
-        (ROOM * lengths / self.edges.len() as f64).max(ROOM * self.params.thickness)
+        (ROOM * lengths / self.edges.len() as f64).max(ROOM * self.thickest)
     }
 
     /// All pairs that come closer than `reach` \[m\] while the cloth moves by `d` from `x`, in a
@@ -208,6 +216,7 @@ impl Layers {
             vertices: [v, a, b, c],
             kind: Kind::PointTriangle,
             kappa: self.vertex_kappa[v as usize],
+            h: self.between(&[v], &[a, b, c]),
         })
     }
 
@@ -219,7 +228,17 @@ impl Layers {
             vertices: [a, b, c, d],
             kind: Kind::EdgeEdge(PARALLEL * self.squared_lengths[e] * self.squared_lengths[f]),
             kappa: 0.5 * (self.edge_kappa[e] + self.edge_kappa[f]),
+            h: self.between(&[a, b], &[c, d]),
         })
+    }
+
+    /// Distance at which two pieces begin to feel each other \[m\]: half of it is each one's.
+    fn between(&self, first: &[u32], second: &[u32]) -> f64 {
+        let mean = |side: &[u32]| {
+            let sum: f64 = side.iter().map(|v| self.thickness[*v as usize]).sum();
+            sum / side.len() as f64
+        };
+        0.5 * (mean(first) + mean(second))
     }
 
     fn exempt(&self, first: &[u32], second: &[u32]) -> bool {

@@ -101,8 +101,6 @@ pub struct System<'a, S> {
     pub surface: &'a S,
     /// How cloth meets it.
     pub contact: ContactParams,
-    /// Distance at which layers of cloth begin to feel each other \[m\].
-    pub thickness: f64,
     /// Friction of each of the cloth's contact points; none at all without friction.
     pub grips: &'a [Grip],
 }
@@ -112,7 +110,7 @@ impl<S: Surface> System<'_, S> {
     pub fn energy(&self, x: &[Vec3], pairs: &[Pair]) -> f64 {
         let mut sum = 0.0;
         for pair in pairs {
-            sum += pair.energy(self.thickness, pair.vertices.map(|a| x[a as usize]));
+            sum += pair.energy(pair.vertices.map(|a| x[a as usize]));
         }
         for (e, t) in self.cloth.triangles.iter().enumerate() {
             let (rest, d) = (&self.rest.triangles[e], &self.cloth.material(e).elasticity);
@@ -143,7 +141,7 @@ impl<S: Surface> System<'_, S> {
         let mut f: Vec<Vec3> = self.rest.mass.iter().map(|m| GRAVITY * *m).collect();
         for pair in pairs {
             let corners = pair.vertices.map(|a| x[a as usize]);
-            if let Some(forces) = pair.force(self.thickness, corners) {
+            if let Some(forces) = pair.force(corners) {
                 for (a, force) in pair.vertices.iter().zip(forces) {
                     f[*a as usize] += force;
                 }
@@ -195,7 +193,7 @@ impl<S: Surface> System<'_, S> {
         let mut k = BlockMatrix::zeros(Arc::clone(&assembly.structure));
         for pair in pairs {
             let corners = pair.vertices.map(|a| x[a as usize]);
-            let Some(blocks) = pair.stiffness(self.thickness, corners, exactness) else {
+            let Some(blocks) = pair.stiffness(corners, exactness) else {
                 continue;
             };
             let v = pair.vertices;
@@ -261,7 +259,7 @@ impl<S: Surface> System<'_, S> {
         let mut blocks = Vec::new();
         for (grip, point) in self.grips.iter().zip(&self.cloth.contacts) {
             let at = [self.kappa(point), self.contact.thickness];
-            let mu = self.contact.friction;
+            let mu = self.contact.friction.or(point.friction);
             if let Some(block) = grip.drift(self.surface, mu, at, point.at(x)) {
                 let [a, b] = point.ends;
                 blocks.extend([(a, a), (a, b), (b, a), (b, b)].map(|(a, b)| (a, b, 0.25 * block)));
@@ -289,6 +287,7 @@ mod tests {
     use crate::sim::energy::contact::fixtures::Cone;
     use crate::sim::energy::layers::LayerParams;
     use crate::sim::layers::Layers;
+    use crate::sim::material::OrFabric;
 
     #[test]
     fn force_and_stiffness_are_derivatives_of_the_energy() {
@@ -309,7 +308,7 @@ mod tests {
         let contact = ContactParams {
             thickness: 0.02,
             stiffness: 1e4,
-            friction: 0.0,
+            friction: OrFabric::Number(0.0),
         };
         let mut x = fixtures::rolled(&mesh, 0.6, 0.092);
         let mut grips = vec![Grip::default(); cloth.contacts.len()];
@@ -321,7 +320,6 @@ mod tests {
             rest: &rest,
             surface: &surface,
             contact,
-            thickness: 0.055,
             grips: &grips,
         };
         for (i, p) in x.iter_mut().enumerate() {
@@ -335,7 +333,7 @@ mod tests {
 
         // Pairs of neighbours that a thickness this large lets touch, as layers would.
         let layers = LayerParams {
-            thickness: system.thickness,
+            thickness: OrFabric::Number(0.055),
             stiffness: 1e4,
             ..LayerParams::default()
         };
@@ -348,7 +346,7 @@ mod tests {
         let assembly = Assembly::coupling(&cloth, &pairs);
         let touching = pairs.iter().filter(|pair| {
             let corners = pair.vertices.map(|a| x[a as usize]);
-            pair.energy(system.thickness, corners) > 0.0
+            pair.energy(corners) > 0.0
         });
         assert!(touching.count() > 20);
 

@@ -104,7 +104,6 @@ impl<'a, S: Surface> Trajectory<'a, S> {
             rest: &self.rest,
             surface: self.surface,
             contact: self.params.contact,
-            thickness: self.params.layers.thickness,
             grips: &[],
         };
         system.residual(&system.force(&self.last.x, &[]))

@@ -76,7 +76,7 @@ fn named_or_file(name: &Path) -> Result<Fabric, BadInput> {
     if !name.exists() {
         let text = format!(
             "there is no fabric of this name, and no such file; there are {}",
-            names()
+            fabrics::names()
         );
         return Err(bad(vec![Problem::whole(text)]));
     }
@@ -98,12 +98,6 @@ fn named_or_file(name: &Path) -> Result<Fabric, BadInput> {
         .map_err(|problem| bad(vec![problem]))
 }
 
-/// All fabrics there are, in words.
-fn names() -> String {
-    let names: Vec<&str> = fabrics::ALL.iter().map(|fabric| fabric.name).collect();
-    names.join(", ")
-}
-
 /// What a parameter file tells of fabrics.
 #[derive(Debug, Default)]
 pub(super) struct ToldFabrics {
@@ -123,6 +117,8 @@ pub(super) struct Told {
     shear: Option<f64>,
     bending: Option<f64>,
     density: Option<f64>,
+    thickness: Option<f64>,
+    friction: Option<f64>,
 }
 
 /// A [`FabricZone`] as far as it is told.
@@ -141,7 +137,10 @@ impl Told {
             None => base,
             Some(name) => {
                 let found = fabrics::named(name).ok_or_else(|| {
-                    let text = format!("there is no fabric `{name}`; there are {}", names());
+                    let text = format!(
+                        "there is no fabric `{name}`; there are {}",
+                        fabrics::names()
+                    );
                     Problem::at("key `fabric.like`", text)
                 })?;
                 found.fabric
@@ -154,6 +153,8 @@ impl Told {
             shear: self.shear.unwrap_or(base.shear),
             bending: self.bending.unwrap_or(base.bending),
             density: self.density.unwrap_or(base.density),
+            thickness: self.thickness.unwrap_or(base.thickness),
+            friction: self.friction.unwrap_or(base.friction),
         })
     }
 }

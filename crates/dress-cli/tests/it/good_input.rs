@@ -165,6 +165,25 @@ fn a_body_is_told_by_size_unit_and_axis() {
     }
 }
 
+#[test]
+fn fabrics_are_listed_and_told_with_their_sources() {
+    let place = Workplace::new();
+    let all = place.dress(&["fabrics"]);
+    assert_eq!(all.code, 0);
+    for name in ["cotton-poplin", "denim", "tulle", "leather"] {
+        assert!(all.stdout.contains(name), "{name}");
+    }
+    let one = place.dress(&["fabrics", "denim"]);
+    assert!(one.stdout.contains("Wang et al. 2011"), "{}", one.stdout);
+    let none = place.dress(&["fabrics", "felt"]);
+    assert_eq!(none.code, 2);
+    assert!(
+        none.stderr.contains("there are shirting"),
+        "{}",
+        none.stderr
+    );
+}
+
 /// Minutes: `cargo test --release -p dress-cli -- --ignored`.
 #[test]
 #[ignore = "takes minutes"]

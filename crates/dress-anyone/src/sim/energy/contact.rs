@@ -9,6 +9,7 @@
 
 use crate::body::distance_field::DistanceField;
 use crate::geometry::{Mat3, Vec3};
+use crate::sim::material::OrFabric;
 use serde::{Deserialize, Serialize};
 
 /// Something solid that cloth lies on.
@@ -63,9 +64,9 @@ pub struct ContactParams {
     pub thickness: f64,
     /// κ₀ \[N/m³\]: pressure per depth. Higher sinks in less and solves slower.
     pub stiffness: f64,
-    /// Coulomb's coefficient μ of cloth on the body \[–\]: 0 lets it slide. Cloth on skin 0.3 to 0.6.
+    /// Coulomb's coefficient μ of cloth on the body \[–\]: 0 lets it slide. Cloth on skin 0.2 to 0.6.
     /// The paper has none.
-    pub friction: f64,
+    pub friction: OrFabric,
 }
 
 impl Default for ContactParams {
@@ -73,8 +74,15 @@ impl Default for ContactParams {
         Self {
             thickness: 3e-3,
             stiffness: 5e6,
-            friction: 0.0,
+            friction: OrFabric::Number(0.0),
         }
+    }
+}
+
+impl ContactParams {
+    /// Whether there is friction at all.
+    pub fn rubs(&self) -> bool {
+        self.friction != OrFabric::Number(0.0)
     }
 }
 

@@ -8,6 +8,7 @@
 //! Li et al. 2020 (IPC, §5.2), fades the pair out there.
 
 use crate::geometry::{Mat2, Mat3, Vec2, Vec3};
+use crate::sim::material::OrFabric;
 use serde::{Deserialize, Serialize};
 
 /// How cloth meets cloth.
@@ -16,8 +17,9 @@ use serde::{Deserialize, Serialize};
 pub struct LayerParams {
     /// Whether cloth feels cloth at all. The paper does not say.
     pub on: bool,
-    /// Distance h at which layers begin to feel each other \[m\]. 1e-3 to 3e-3.
-    pub thickness: f64,
+    /// Distance h at which layers begin to feel each other \[m\]: the thickness of the fabrics, but no less
+    /// than [`LEAST_THICKNESS`], or a number. 1e-3 to 3e-3.
+    pub thickness: OrFabric,
     /// κ₀ \[N/m³\]: pressure per depth, near h. Higher yields less and solves slower.
     pub stiffness: f64,
 }
@@ -26,11 +28,15 @@ impl Default for LayerParams {
     fn default() -> Self {
         Self {
             on: true,
-            thickness: 2e-3,
+            thickness: OrFabric::Fabric,
             stiffness: 1e6,
         }
     }
 }
+
+/// Least distance at which layers of thin fabrics begin to feel each other \[m\]: moves are cut where
+/// layers meet, and take ever more steps the closer they are.
+pub const LEAST_THICKNESS: f64 = 2e-3;
 
 /// Two pieces of cloth that may touch.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -41,6 +47,8 @@ pub struct Pair {
     pub kind: Kind,
     /// Contact stiffness κ \[N/m\].
     pub kappa: f64,
+    /// Distance h at which they begin to feel each other \[m\].
+    pub h: f64,
 }
 
 /// What touches what.
@@ -74,22 +82,22 @@ impl Pair {
     }
 
     /// U \[J\].
-    pub fn energy(&self, h: f64, x: [Vec3; 4]) -> f64 {
+    pub fn energy(&self, x: [Vec3; 4]) -> f64 {
         let delta = self.closest(x).r.norm();
-        if delta >= h {
+        if delta >= self.h {
             return 0.0;
         }
-        self.kappa * spring(h, delta)[0] * self.fade(x).map_or(1.0, |f| f.m[0])
+        self.kappa * spring(self.h, delta)[0] * self.fade(x).map_or(1.0, |f| f.m[0])
     }
 
     /// −∂U/∂x \[N\]; none where there is no contact.
-    pub fn force(&self, h: f64, x: [Vec3; 4]) -> Option<[Vec3; 4]> {
+    pub fn force(&self, x: [Vec3; 4]) -> Option<[Vec3; 4]> {
         let closest = self.closest(x);
         let delta = closest.r.norm();
-        if delta >= h {
+        if delta >= self.h {
             return None;
         }
-        let [value, slope, _] = spring(h, delta).map(|s| s * self.kappa);
+        let [value, slope, _] = spring(self.h, delta).map(|s| s * self.kappa);
         let n = closest.r / delta;
         let fade = self.fade(x);
         let m = fade.as_ref().map_or(1.0, |f| f.m[0]);
@@ -105,13 +113,13 @@ impl Pair {
 
     /// ∂²U/∂x² \[N/m\], blocks `[a][b]`; none where there is no contact. With the part `exactness`
     /// of all that bends: 1 is exact, 0 keeps the positive semi-definite part along the normal.
-    pub fn stiffness(&self, h: f64, x: [Vec3; 4], exactness: f64) -> Option<[[Mat3; 4]; 4]> {
+    pub fn stiffness(&self, x: [Vec3; 4], exactness: f64) -> Option<[[Mat3; 4]; 4]> {
         let closest = self.closest(x);
         let delta = closest.r.norm();
-        if delta >= h {
+        if delta >= self.h {
             return None;
         }
-        let [value, slope, bend] = spring(h, delta).map(|s| s * self.kappa);
+        let [value, slope, bend] = spring(self.h, delta).map(|s| s * self.kappa);
         let n = closest.r / delta;
         let fade = self.fade(x);
         let m = fade.as_ref().map_or(1.0, |f| f.m[0]);
@@ -338,23 +346,24 @@ mod tests {
             vertices: [0, 1, 2, 3],
             kind,
             kappa: 3.0,
+            h: H,
         };
         let along = |seed: usize| -> [Vec3; 4] {
             std::array::from_fn(|k| Vec3::from_fn(|c, _| noise(seed + 3 * k + c)))
         };
         let (d, q) = (along(seed), along(seed + 40));
         let at = |s: f64| std::array::from_fn(|k| x[k] + d[k] * s);
-        assert!(pair.energy(H, x) > 0.0, "they must touch");
-        let force = pair.force(H, x).expect("touches");
+        assert!(pair.energy(x) > 0.0, "they must touch");
+        let force = pair.force(x).expect("touches");
         let slope: f64 = -(0..4).map(|k| force[k].dot(&d[k])).sum::<f64>();
-        assert_derivative(|s| pair.energy(H, at(s)), slope, 1e-6, 1e-3, 1e-7);
-        let k = pair.stiffness(H, x, 1.0).expect("touches");
+        assert_derivative(|s| pair.energy(at(s)), slope, 1e-6, 1e-3, 1e-7);
+        let k = pair.stiffness(x, 1.0).expect("touches");
         let slope: f64 = (0..4)
             .flat_map(|a| (0..4).map(move |b| (a, b)))
             .map(|(a, b)| q[a].dot(&(k[a][b] * d[b])))
             .sum();
         let pull = |s: f64| {
-            let force = pair.force(H, at(s)).expect("touches");
+            let force = pair.force(at(s)).expect("touches");
             -(0..4).map(|k| force[k].dot(&q[k])).sum::<f64>()
         };
         assert_derivative(pull, slope, 1e-6, 1e-3, 1e-6);
@@ -407,13 +416,14 @@ mod tests {
             vertices: [0, 1, 2, 3],
             kind: Kind::PointTriangle,
             kappa: 1.0,
+            h: H,
         };
         let normal = (c - a).cross(&(b - a)).normalize();
         let at = |height: f64| [(a + b + c) / 3.0 + normal * height, a, b, c];
-        assert_eq!(pair.energy(H, at(H + 1e-9)), 0.0);
-        assert!(pair.force(H, at(H + 1e-9)).is_none());
+        assert_eq!(pair.energy(at(H + 1e-9)), 0.0);
+        assert!(pair.force(at(H + 1e-9)).is_none());
         // φ′ = h/2 (1 − (h/δ)²): at h/1000 a million times h/2.
-        let force = pair.force(H, at(1e-3 * H)).expect("touches")[0];
+        let force = pair.force(at(1e-3 * H)).expect("touches")[0];
         assert!((force.dot(&normal) / (0.5 * H * (1e6 - 1.0)) - 1.0).abs() < 1e-9);
     }
 }

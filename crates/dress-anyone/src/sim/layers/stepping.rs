@@ -49,7 +49,7 @@ impl Watch {
     pub fn new(cloth: &Cloth, params: LayerParams, x: &[Vec3]) -> Self {
         let layers = Layers::new(cloth, params, x);
         Self {
-            most: layers.most_room().max(params.thickness),
+            most: layers.most_room().max(layers.thickness()),
             layers,
             pairs: Vec::new(),
             from: Vec::new(),
@@ -82,17 +82,16 @@ impl Watch {
             self.pairs = self.layers.search(x, &still, reach);
             self.from = x.to_vec();
         }
-        let h = self.layers.thickness();
-        let reach = h + 2.0 * farthest.min(self.room);
+        let room = 2.0 * farthest.min(self.room);
         let apart = |pair: &Pair| {
             let [a, b, c, d] = pair.vertices.map(|v| v as usize);
             let closest = pair.closest([a, b, c, d].map(|v| x[v]));
             let delta = closest.r.norm();
             let [p, q, r, s] = closest.beta.map(|b| closest.r * (b / delta));
-            (0.0 < delta && delta < reach).then_some(Apart {
+            (0.0 < delta && delta < pair.h + room).then_some(Apart {
                 vertices: [a, b, c, d, d],
                 gradient: [p, q, r, s, Vec3::zeros()],
-                gap: h,
+                gap: pair.h,
                 alpha_tilde: per_time / pair.kappa,
                 lambda: 0.0,
             })

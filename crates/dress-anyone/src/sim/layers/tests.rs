@@ -2,11 +2,13 @@ use super::*;
 use crate::check::noise;
 use crate::garment::Fabric;
 use crate::sim::cloth::fixtures;
+use crate::sim::material::OrFabric;
 use std::collections::BTreeSet;
 
+const THICKNESS: f64 = 4e-3;
 const PARAMS: LayerParams = LayerParams {
     on: true,
-    thickness: 4e-3,
+    thickness: OrFabric::Number(THICKNESS),
     stiffness: 1e6,
 };
 
@@ -32,6 +34,26 @@ fn two_sheets(gap: f64) -> (Cloth, Vec<Vec3>) {
 }
 
 #[test]
+fn layers_begin_to_feel_each_other_at_half_of_each_ones_thickness_together() {
+    let (mut cloth, x) = two_sheets(0.1);
+    // A thin sheet, which counts as 2 mm, and a thick one.
+    let (thin, thick) = cloth.thickness.split_at_mut(49);
+    thin.fill(3e-4);
+    thick.fill(5e-3);
+    let own = LayerParams {
+        thickness: OrFabric::Fabric,
+        ..PARAMS
+    };
+    let layers = Layers::new(&cloth, own, &x);
+    assert_eq!(layers.thickness(), 5e-3);
+    let pair = layers.point_triangle(0, 100).expect("no neighbours");
+    assert!((pair.h - 3.5e-3).abs() < 1e-15);
+    let told = Layers::new(&cloth, PARAMS, &x);
+    let pair = told.point_triangle(0, 100).expect("no neighbours");
+    assert!((pair.h - THICKNESS).abs() < 1e-15);
+}
+
+#[test]
 fn a_flat_sheet_does_not_touch_itself() {
     let (cloth, x) = two_sheets(0.1);
     let mut layers = Layers::new(&cloth, PARAMS, &x);
@@ -49,7 +71,7 @@ fn the_search_finds_what_a_look_at_all_pairs_finds() {
     let found = layers.pairs(&x, &d, 0.0);
     let ends: Vec<Vec3> = x.iter().zip(&d).map(|(x, d)| x + d).collect();
     let touches = |pair: &Pair, x: &[Vec3]| {
-        pair.closest(pair.vertices.map(|v| x[v as usize])).r.norm() < PARAMS.thickness
+        pair.closest(pair.vertices.map(|v| x[v as usize])).r.norm() < THICKNESS
     };
     let (vertices, triangles) = (x.len() as u32, layers.triangles.len() as u32);
     let edges = layers.edges.len() as u32;
@@ -82,10 +104,10 @@ fn pairs_found_with_room_are_those_of_a_search() {
         served += usize::from(layers.near.serves(&x, &own, 0.0));
         let key = |p: &Pair| (p.vertices, p.kind == Kind::PointTriangle);
         let found = layers.pairs(&x, &d, 0.0);
-        let come_close = |p: &Pair| comes_within(p, &x, &own, PARAMS.thickness);
+        let come_close = |p: &Pair| comes_within(p, &x, &own, THICKNESS);
         assert!(found.iter().all(come_close));
         let found: BTreeSet<_> = found.iter().map(key).collect();
-        let searched = layers.search(&x, &own, PARAMS.thickness);
+        let searched = layers.search(&x, &own, THICKNESS);
         // The search also looks at boxes, so it may be content with fewer.
         let missed = searched.iter().filter(|p| !found.contains(&key(p)));
         assert_eq!(missed.count(), 0);

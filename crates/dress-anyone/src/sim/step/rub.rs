@@ -33,7 +33,7 @@ impl Rub {
 impl<S: Surface> Stepper<'_, S> {
     /// The point of `touch`, which moved from `before` to `x`; none if the body does not carry it.
     fn rub_of(&self, touch: &Touch, before: &[Vec3], x: &[Vec3]) -> Option<Rub> {
-        if self.contact.friction == 0.0 || touch.lambda <= 0.0 {
+        if !self.contact.rubs() || touch.lambda <= 0.0 {
             return None;
         }
         let steepness = touch.normal.norm();
@@ -43,8 +43,13 @@ impl<S: Surface> Stepper<'_, S> {
         Some(Rub {
             moved,
             across: moved - normal * normal.dot(&moved),
-            limit: self.contact.friction * touch.lambda * w * steepness,
+            limit: self.mu(touch) * touch.lambda * w * steepness,
         })
+    }
+
+    /// Coulomb's coefficient at a contact point.
+    fn mu(&self, touch: &Touch) -> f64 {
+        self.contact.friction.or(touch.point.friction)
     }
 
     /// Draws back what the body carries.
@@ -70,8 +75,8 @@ impl<S: Surface> Stepper<'_, S> {
 
     /// Undoes [`Self::rub`], and hands the gradients on.
     pub(super) fn pull_back_rub(&self, tape: &Tape, back: &mut Back<'_>, before_hat: &mut [Vec3]) {
-        let mu = self.contact.friction;
         for (e, touch) in tape.touching.iter().enumerate().rev() {
+            let mu = self.mu(touch);
             let (drawn, ends) = (tape.rubbed[e], touch.point.ends.map(|a| a as usize));
             let w = self.inverse_mass(&touch.point);
             let mut drawn_hat = Vec3::zeros();

@@ -7,6 +7,7 @@ use crate::sim::cloth::Hold;
 use crate::sim::cloth::fixtures::{self, SOFT};
 use crate::sim::energy::contact::fixtures::Cone;
 use crate::sim::energy::contact::{ContactParams, Nothing};
+use crate::sim::material::OrFabric;
 
 /// Derivative by the rest shape of a fixed linear function of the end, against two more trajectories.
 fn check<S: Surface>(cloth: &Cloth, surface: &S, mesh: &PatternMesh, x: &[Vec3], steps: usize) {
@@ -14,7 +15,7 @@ fn check<S: Surface>(cloth: &Cloth, surface: &S, mesh: &PatternMesh, x: &[Vec3],
         contact: ContactParams {
             thickness: 0.003,
             stiffness: 1e5,
-            friction: 0.0,
+            friction: OrFabric::Number(0.0),
         },
         ..SimParams::default()
     };

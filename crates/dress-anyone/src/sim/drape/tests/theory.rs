@@ -35,7 +35,7 @@ fn a_tight_tube_presses_as_laplace_says() {
         contact: ContactParams {
             thickness: 0.0,
             stiffness: 1e8,
-            friction: 0.0,
+            friction: OrFabric::Number(0.0),
         },
         equilibrium: EquilibriumParams {
             tolerance: 1e-4,
@@ -123,7 +123,7 @@ fn a_sheet_on_an_incline_sticks_iff_it_is_less_steep_than_the_friction() {
     let cloth = Cloth::new(&mesh, &SOFT);
     let assembly = Assembly::new(&cloth);
     let mut params = firm_contact();
-    params.contact.friction = 0.4;
+    params.contact.friction = OrFabric::Number(0.4);
     for (slope, sticks) in [(0.39, true), (0.41, false)] {
         let incline = Incline { slope };
         let scene = scene(&cloth, &assembly, &incline, &params);

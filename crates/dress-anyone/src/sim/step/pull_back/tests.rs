@@ -8,6 +8,7 @@ use crate::sim::energy::contact::fixtures::Cone;
 use crate::sim::energy::contact::{ContactParams, Nothing};
 use crate::sim::energy::layers::LayerParams;
 use crate::sim::layers::Watch;
+use crate::sim::material::OrFabric;
 use crate::sim::step::StepParams;
 
 const CONE: Cone = Cone {
@@ -26,7 +27,7 @@ fn check<S: Surface>(
     params: StepParams,
     start: &State,
 ) {
-    check_with(mesh, cloth, surface, params, start, 0.0);
+    check_with(mesh, cloth, surface, params, start, OrFabric::Number(0.0));
 }
 
 /// The same with friction.
@@ -36,7 +37,7 @@ fn check_with<S: Surface>(
     surface: &S,
     params: StepParams,
     start: &State,
-    friction: f64,
+    friction: OrFabric,
 ) {
     let contact = ContactParams {
         thickness: 0.01,
@@ -199,9 +200,10 @@ fn a_step_against_a_body_has_an_exact_adjoint() {
 #[test]
 fn a_step_with_friction_has_an_exact_adjoint() {
     let mesh = fixtures::tube(12, 4, 0.06);
-    let cloth = Cloth::new(&mesh, &SOFT);
+    let cloth = fixtures::patched(&mesh);
     // Little slips with much friction, and much with little.
-    for friction in [0.05, 3.0] {
+    let told = [0.05, 3.0].map(OrFabric::Number);
+    for friction in [told[0], told[1], OrFabric::Fabric] {
         check_with(
             &mesh,
             &cloth,

@@ -36,7 +36,6 @@ impl<S: Surface> Setting<'_, S> {
             rest,
             surface: self.scene.surface,
             contact: self.scene.params.contact,
-            thickness: self.scene.params.layers.thickness,
             grips: &[],
         }
     }

@@ -9,6 +9,7 @@ use crate::geometry::Mat3;
 use crate::sim::drape;
 use crate::sim::drape::Start;
 use crate::sim::equilibrium::RestStatus;
+use crate::sim::material::OrFabric;
 use crate::sim::step::StepParams;
 
 /// The outside of an ellipsoid, hollow: |D p| = radius, wider along x than along z.
@@ -56,7 +57,7 @@ fn from_rest<S: Surface>(
         contact: ContactParams {
             thickness: 0.003,
             stiffness: 1e5,
-            friction: 0.0,
+            friction: OrFabric::Number(0.0),
         },
         ..SimParams::default()
     };
