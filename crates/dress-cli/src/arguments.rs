@@ -39,6 +39,8 @@ pub enum Command {
     Transfer(TransferArguments),
     /// Drape a garment on a body.
     Drape(DrapeArguments),
+    /// Picture the results of many drapes in one sheet.
+    Sheet(SheetArguments),
     /// Tell what is in a garment or body file, and what is wrong with it.
     Inspect(InspectArguments),
     /// Draw, show, pose, measure and fit bodies.
@@ -127,6 +129,20 @@ pub struct DrapeArguments {
     /// How to run.
     #[command(flatten)]
     pub running: RunningArguments,
+}
+
+/// `dress sheet`.
+#[derive(Debug, Args)]
+pub struct SheetArguments {
+    /// Folders that `dress drape` wrote
+    #[arg(value_name = "FOLDER", required = true)]
+    pub folders: Vec<PathBuf>,
+    /// Garments in a row
+    #[arg(long, value_name = "N", default_value = "6")]
+    pub columns: NonZeroUsize,
+    /// Folder for the picture
+    #[arg(long, value_name = "FOLDER", default_value = "dress-out")]
+    pub out: PathBuf,
 }
 
 /// `dress inspect`.

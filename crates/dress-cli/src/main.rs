@@ -23,6 +23,7 @@ mod params;
 mod picture;
 mod progress;
 mod refit;
+mod sheet;
 mod show;
 mod summary;
 mod transfer;
@@ -74,6 +75,7 @@ fn run(command: &Command) -> Result<String, Failure> {
             drape::run(arguments)
         }
         Command::Body(command) => body::run(command),
+        Command::Sheet(arguments) => sheet::run(arguments),
         Command::Inspect(arguments) => inspect::run(arguments),
         Command::Fabrics(arguments) => fabrics::run(arguments),
         Command::Params => Ok(params::TEMPLATE.to_owned()),

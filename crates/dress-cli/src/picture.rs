@@ -2,7 +2,8 @@
 //!
 //! [`preview`] is a contact sheet: one column per [`Figure`], one row per [`View`], all at one
 //! scale and cut to the height of the clothes. Wrong sides of cloth are plum, so that an
-//! inside-out sleeve is seen at once. [`pattern_png`] shows a meshed pattern flat.
+//! inside-out sleeve is seen at once. [`tiles`] shows many figures, each at its own scale.
+//! [`pattern_png`] shows a meshed pattern flat.
 
 mod canvas;
 mod colour;
@@ -10,8 +11,10 @@ mod flat;
 mod raster;
 mod scene;
 mod text;
+mod tiles;
 
 pub use flat::pattern_png;
+pub use tiles::tiles;
 
 use canvas::{Area, Canvas};
 use colour::{INK, Rgb, hex, mix, scaled};

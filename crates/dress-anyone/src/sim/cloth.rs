@@ -1,6 +1,7 @@
 //! What the simulator knows of a garment: its topology and fabrics ([`Cloth`]), and what follows
 //! from one rest shape x̄ ([`Rest`]).
 
+mod contacts;
 #[cfg(test)]
 pub(crate) mod fixtures;
 
@@ -10,6 +11,8 @@ use super::material::Material;
 use crate::garment::{Cut, Fabric};
 use crate::geometry::{Vec2, Vec3};
 use crate::pattern::PatternMesh;
+pub use contacts::ContactPoint;
+use contacts::contact_points;
 use std::collections::BTreeMap;
 
 /// Standard gravity \[m/s²\], y up.
@@ -33,7 +36,7 @@ pub struct Cloth {
     pub reference_area: Vec<f64>,
     /// Thickness of each cloth vertex \[m\]: the mean of the fabrics about it.
     pub thickness: Vec<f64>,
-    /// Where the cloth meets the body: its vertices and the middles of its edges.
+    /// Where the cloth feels the body.
     pub contacts: Vec<ContactPoint>,
     /// What it is made of; every one once.
     pub materials: Vec<Material>,
@@ -57,26 +60,6 @@ pub struct Hinge {
     pub rest: [[u32; 3]; 2],
     /// The triangle on each side.
     pub triangles: [u32; 2],
-}
-
-/// A point of the cloth that feels the body: the middle of an edge, or a vertex, which is the middle
-/// of an edge from itself to itself.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ContactPoint {
-    /// Cloth vertices.
-    pub ends: [u32; 2],
-    /// Its part of the reference pattern's area \[m²\].
-    pub area: f64,
-    /// Coulomb's coefficient on the body \[–\]: the mean of the fabrics about it.
-    pub friction: f64,
-}
-
-impl ContactPoint {
-    /// Where it is \[m\].
-    pub fn at(&self, x: &[Vec3]) -> Vec3 {
-        let [a, b] = self.ends.map(|a| x[a as usize]);
-        0.5 * (a + b)
-    }
 }
 
 /// A vertex kept near a height by a spring, as an elastic waistband or a neckline tape does:
@@ -205,36 +188,6 @@ impl Rest {
     pub fn weight(&self) -> f64 {
         self.mass.iter().map(|m| m * m).sum::<f64>().sqrt() * GRAVITY.norm()
     }
-}
-
-/// Vertices and edge middles with the areas that integrate over every triangle cut in four: each
-/// vertex has a quarter of a third of a triangle's area, each middle a quarter of it.
-fn contact_points(
-    mesh: &PatternMesh,
-    welded: &[[u32; 3]],
-    friction: impl Fn(usize) -> f64,
-) -> Vec<ContactPoint> {
-    // Area, and friction times area.
-    let mut sums: BTreeMap<[u32; 2], [f64; 2]> = BTreeMap::new();
-    for (t, triangle) in welded.iter().enumerate() {
-        let area = mesh.rest_area(t, &mesh.x_bar);
-        let mut add = |ends, area| {
-            let sum = sums.entry(ends).or_default();
-            sum[0] += area;
-            sum[1] += area * friction(t);
-        };
-        for corner in 0..3 {
-            let (a, b) = (triangle[corner], triangle[(corner + 1) % 3]);
-            add([a, a], area / 12.0);
-            add([a.min(b), a.max(b)], area / 4.0);
-        }
-    }
-    let point = |(ends, [area, sum]): ([u32; 2], [f64; 2])| ContactPoint {
-        ends,
-        area,
-        friction: sum / area,
-    };
-    sums.into_iter().map(point).collect()
 }
 
 /// The interior edges of the welded mesh; an edge of more than two triangles gets one hinge per

@@ -247,29 +247,18 @@ impl<'a, S: Surface> Stepper<'a, S> {
 
     fn sweep_contact(&self, touching: &mut [Touch], x: &mut [Vec3], mut tape: Option<&mut Tape>) {
         for touch in touching {
-            let [a, b] = touch.point.ends.map(|a| a as usize);
             let c = touch.normal.dot(&touch.point.at(x)) - touch.offset;
-            let w = self.inverse_mass(&touch.point) * touch.normal.norm_squared();
+            let w = touch.point.inverse_mass(&self.w) * touch.normal.norm_squared();
             let wanted =
                 touch.lambda + (-c - touch.alpha_tilde * touch.lambda) / (w + touch.alpha_tilde);
             let delta = wanted.max(0.0) - touch.lambda;
             touch.lambda += delta;
-            for a in [a, b] {
-                x[a] += touch.normal * (0.5 * self.w[a] * delta);
+            for (a, weight) in touch.point.parts() {
+                x[a] += touch.normal * (weight * self.w[a] * delta);
             }
             if let Some(tape) = &mut tape {
                 tape.contact.push(touch.lambda);
             }
-        }
-    }
-
-    /// Of a contact point \[1/kg\]: ∂p/∂x of an end is ½; a vertex is both its ends.
-    fn inverse_mass(&self, point: &ContactPoint) -> f64 {
-        let [a, b] = point.ends.map(|a| a as usize);
-        if a == b {
-            self.w[a]
-        } else {
-            0.25 * (self.w[a] + self.w[b])
         }
     }
 

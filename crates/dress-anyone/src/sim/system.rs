@@ -19,8 +19,8 @@ pub struct Assembly {
     triangles: Vec<[Slot; 6]>,
     /// Lower-triangle block pairs of each hinge, in the order of [`PAIRS`].
     hinges: Vec<[Slot; 10]>,
-    /// Lower-triangle block pairs of each contact point: first end, both, second end.
-    contacts: Vec<[Slot; 3]>,
+    /// Lower-triangle block pairs of each contact point's vertices, one point after the other.
+    contacts: Vec<Slot>,
     vertices: Vec<Slot>,
 }
 
@@ -64,13 +64,8 @@ impl Assembly {
                     std::array::from_fn(|p| slot(h.vertices[PAIRS[p].0], h.vertices[PAIRS[p].1]))
                 })
                 .collect(),
-            contacts: cloth
-                .contacts
-                .iter()
-                .map(|point| {
-                    let [a, b] = point.ends;
-                    [slot(a, a), slot(a, b), slot(b, b)]
-                })
+            contacts: (cloth.contacts.iter())
+                .flat_map(|point| pairs_of(point).map(|(a, b, _)| slot(a as u32, b as u32)))
                 .collect(),
             vertices: (0..cloth.vertex_count as u32).map(|v| slot(v, v)).collect(),
             structure: Arc::new(structure),
@@ -89,6 +84,16 @@ impl Assembly {
     pub fn structure(&self) -> &Structure {
         &self.structure
     }
+}
+
+/// Pairs (row, column) of a contact point's vertices in the lower triangle, with the products of their
+/// weights. Vertices rise.
+fn pairs_of(point: &ContactPoint) -> impl Iterator<Item = (usize, usize, f64)> + use<> {
+    let point = *point;
+    (point.parts()).flat_map(move |(b, u)| {
+        let rows = point.parts().filter(move |(a, _)| *a >= b);
+        rows.map(move |(a, v)| (a, b, u * v))
+    })
 }
 
 /// Cloth with one rest shape on one body.
@@ -163,14 +168,14 @@ impl<S: Surface> System<'_, S> {
         for point in &self.cloth.contacts {
             let h = self.contact.thickness;
             let force = contact::force(self.surface, self.kappa(point), h, point.at(x));
-            for a in point.ends {
-                f[a as usize] += 0.5 * force;
+            for (a, weight) in point.parts() {
+                f[a] += weight * force;
             }
         }
         for (grip, point) in self.grips.iter().zip(&self.cloth.contacts) {
             let force = grip.force(self.kappa(point), point.at(x));
-            for a in point.ends {
-                f[a as usize] += 0.5 * force;
+            for (a, weight) in point.parts() {
+                f[a] += weight * force;
             }
         }
         for hold in &self.cloth.holds {
@@ -227,8 +232,10 @@ impl<S: Surface> System<'_, S> {
                 k.add_scalar(*slot, if twice { 2.0 * value } else { value });
             }
         }
-        for (i, (point, slots)) in (self.cloth.contacts.iter().zip(&assembly.contacts)).enumerate()
-        {
+        let mut slots = assembly.contacts.as_slice();
+        for (i, point) in self.cloth.contacts.iter().enumerate() {
+            let own;
+            (own, slots) = slots.split_at(pairs_of(point).count());
             let (kappa, h) = (self.kappa(point), self.contact.thickness);
             let p = point.at(x);
             let pressing = contact::stiffness(self.surface, kappa, h, p, exactness);
@@ -236,14 +243,9 @@ impl<S: Surface> System<'_, S> {
             let Some(block) = pressing.into_iter().chain(gripping).reduce(|a, b| a + b) else {
                 continue;
             };
-            let [a, b] = point.ends;
-            if a == b {
-                k.add(slots[0], &block);
-            } else {
-                // The block is symmetric, so it is its own transpose in the lower triangle.
-                for slot in slots {
-                    k.add(*slot, &(0.25 * block));
-                }
+            // The block is symmetric, so it is its own transpose in the lower triangle.
+            for (slot, (_, _, weight)) in own.iter().zip(pairs_of(point)) {
+                k.add(*slot, &(weight * block));
             }
         }
         for hold in &self.cloth.holds {
@@ -261,8 +263,10 @@ impl<S: Surface> System<'_, S> {
             let at = [self.kappa(point), self.contact.thickness];
             let mu = self.contact.friction.or(point.friction);
             if let Some(block) = grip.drift(self.surface, mu, at, point.at(x)) {
-                let [a, b] = point.ends;
-                blocks.extend([(a, a), (a, b), (b, a), (b, b)].map(|(a, b)| (a, b, 0.25 * block)));
+                for (a, row) in point.parts() {
+                    let columns = point.parts();
+                    blocks.extend(columns.map(|(b, w)| (a as u32, b as u32, row * w * block)));
+                }
             }
         }
         blocks

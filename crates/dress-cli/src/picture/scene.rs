@@ -73,6 +73,18 @@ impl Frame {
             cut,
         }
     }
+
+    /// The same, widened or heightened to the shape of a tile of this size.
+    pub fn shaped(self, tile: [usize; 2]) -> Self {
+        let aspect = tile[0] as f64 / tile[1] as f64;
+        let height = self.height.max(self.width / aspect);
+        Self {
+            bottom: self.bottom - 0.5 * (height - self.height),
+            width: height * aspect,
+            height,
+            cut: self.cut,
+        }
+    }
 }
 
 /// Draws a figure into the tile at `corner`; `scale_top` is the top of the distance scale \[m\].

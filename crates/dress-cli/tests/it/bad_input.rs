@@ -374,3 +374,17 @@ fn a_command_line_that_makes_no_sense() {
         assert_eq!(place.dress(line).code, 2, "{line:?}");
     }
 }
+
+#[test]
+fn folders_without_a_drape_make_no_sheet() {
+    let place = Workplace::new();
+    place.file("report.json", r#"{"status": "converged"}"#);
+    let before = place.names();
+    for (folder, words) in [
+        (".", "no report of `dress drape`"),
+        ("none", "no such file"),
+    ] {
+        let ran = place.dress(&["sheet", folder, "--out", "out"]);
+        assert_refused(&place, &before, &ran, &[words]);
+    }
+}

@@ -60,7 +60,10 @@ fn a_cloth_laid_on_a_box_is_draped_and_told_of() {
     for name in ["garment.obj", "pattern.svg", "preview.png", "mesh.png"] {
         assert!(place.path("out").join(name).is_file(), "{name}");
     }
-    // What was written is a garment again.
+    // What was written goes into a sheet, and is a garment again.
+    let ran = place.dress(&["sheet", "out", "out", "--columns", "1", "--out", "both"]);
+    assert_eq!(ran.code, 0, "{}", ran.stderr);
+    assert!(place.path("both/sheet.png").is_file());
     let ran = place.dress(&["inspect", "out/garment.obj"]);
     assert_eq!(ran.code, 0, "{}", ran.stderr);
     assert!(

@@ -223,31 +223,27 @@ impl<S: Surface> Stepper<'_, S> {
                 continue;
             }
             let delta = after - before;
-            let ends = touch.point.ends.map(|a| a as usize);
             let mut delta_hat = 0.0;
-            for a in ends {
-                let along = 0.5 * touch.normal.dot(&back.x_hat[a]);
+            for (a, weight) in touch.point.parts() {
+                let along = weight * touch.normal.dot(&back.x_hat[a]);
                 delta_hat += self.w[a] * along;
                 back.rest.w[a] += delta * along;
-                back.normal[e] += back.x_hat[a] * (0.5 * self.w[a] * delta);
-            }
-            for a in ends {
-                back.x[a] -= touch.normal * (0.5 * self.w[a] * delta);
+                back.normal[e] += back.x_hat[a] * (weight * self.w[a] * delta);
+                back.x[a] -= touch.normal * (weight * self.w[a] * delta);
             }
             let after_hat = back.contact[e] + delta_hat;
             back.contact[e] = -delta_hat;
             if after > 0.0 {
-                let w = self.inverse_mass(&touch.point);
+                let w = touch.point.inverse_mass(&self.w);
                 let squared = touch.normal.norm_squared();
                 let r_hat = after_hat / (w * squared + touch.alpha_tilde);
                 back.contact[e] += after_hat - touch.alpha_tilde * r_hat;
                 back.normal[e] -= touch.point.at(&back.x) * r_hat;
                 back.normal[e] -= touch.normal * (2.0 * w * r_hat * delta);
                 back.offset[e] += r_hat;
-                let share = if ends[0] == ends[1] { 0.5 } else { 0.25 };
-                for a in ends {
-                    back.rest.w[a] -= share * squared * r_hat * delta;
-                    back.x_hat[a] -= touch.normal * (0.5 * r_hat);
+                for (a, weight) in touch.point.parts() {
+                    back.rest.w[a] -= weight * weight * squared * r_hat * delta;
+                    back.x_hat[a] -= touch.normal * (weight * r_hat);
                 }
             }
         }
@@ -272,8 +268,8 @@ impl<S: Surface> Stepper<'_, S> {
                 (n_hat - normal * normal.dot(&n_hat)) / length
             };
             let p_hat = (normal - gradient) * offset_hat + self.surface.curvature(p) * by_gradient;
-            for a in point.ends {
-                before_hat[a as usize] += p_hat * 0.5;
+            for (a, weight) in point.parts() {
+                before_hat[a] += p_hat * weight;
             }
         }
     }

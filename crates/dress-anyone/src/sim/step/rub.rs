@@ -39,7 +39,7 @@ impl<S: Surface> Stepper<'_, S> {
         let steepness = touch.normal.norm();
         let normal = touch.normal / steepness;
         let moved = touch.point.at(x) - touch.point.at(before);
-        let w = self.inverse_mass(&touch.point);
+        let w = touch.point.inverse_mass(&self.w);
         Some(Rub {
             moved,
             across: moved - normal * normal.dot(&moved),
@@ -63,9 +63,9 @@ impl<S: Surface> Stepper<'_, S> {
         for touch in touching {
             let rub = self.rub_of(touch, before, x);
             let back = rub.map_or_else(Vec3::zeros, |rub| rub.back());
-            let w = self.inverse_mass(&touch.point);
-            for a in touch.point.ends.map(|a| a as usize) {
-                x[a] += back * (0.5 * self.w[a] / w);
+            let w = touch.point.inverse_mass(&self.w);
+            for (a, weight) in touch.point.parts() {
+                x[a] += back * (weight * self.w[a] / w);
             }
             if let Some(tape) = &mut tape {
                 tape.rubbed.push(back);
@@ -77,16 +77,16 @@ impl<S: Surface> Stepper<'_, S> {
     pub(super) fn pull_back_rub(&self, tape: &Tape, back: &mut Back<'_>, before_hat: &mut [Vec3]) {
         for (e, touch) in tape.touching.iter().enumerate().rev() {
             let mu = self.mu(touch);
-            let (drawn, ends) = (tape.rubbed[e], touch.point.ends.map(|a| a as usize));
-            let w = self.inverse_mass(&touch.point);
+            let (drawn, point) = (tape.rubbed[e], &touch.point);
+            let w = point.inverse_mass(&self.w);
             let mut drawn_hat = Vec3::zeros();
             let mut w_hat = 0.0;
-            for a in ends {
-                let along = 0.5 * back.x_hat[a].dot(&drawn) / w;
-                drawn_hat += back.x_hat[a] * (0.5 * self.w[a] / w);
+            for (a, weight) in point.parts() {
+                let along = weight * back.x_hat[a].dot(&drawn) / w;
+                drawn_hat += back.x_hat[a] * (weight * self.w[a] / w);
                 back.rest.w[a] += along;
                 w_hat -= along * self.w[a] / w;
-                back.x[a] -= drawn * (0.5 * self.w[a] / w);
+                back.x[a] -= drawn * (weight * self.w[a] / w);
             }
             if let Some(rub) = self.rub_of(touch, &tape.before, &back.x) {
                 let steepness = touch.normal.norm();
@@ -105,15 +105,14 @@ impl<S: Surface> Stepper<'_, S> {
                 let turned =
                     rub.moved * normal.dot(&across_hat) + across_hat * normal.dot(&rub.moved);
                 back.normal[e] -= level(turned) / steepness;
-                let moved_hat = level(across_hat) * 0.5;
-                for a in ends {
-                    back.x_hat[a] += moved_hat;
-                    before_hat[a] -= moved_hat;
+                let moved_hat = level(across_hat);
+                for (a, weight) in point.parts() {
+                    back.x_hat[a] += moved_hat * weight;
+                    before_hat[a] -= moved_hat * weight;
                 }
             }
-            let share = if ends[0] == ends[1] { 0.5 } else { 0.25 };
-            for a in ends {
-                back.rest.w[a] += share * w_hat;
+            for (a, weight) in point.parts() {
+                back.rest.w[a] += weight * weight * w_hat;
             }
         }
     }

@@ -1,0 +1,128 @@
+//! Points of the cloth that feel the body: those of a triangular grid in every triangle of the mesh,
+//! its vertices included. A mesh alone would let the body come through between its vertices.
+
+use crate::geometry::Vec3;
+use crate::pattern::PatternMesh;
+use std::collections::BTreeMap;
+
+/// A point of a triangle that feels the body: p = Σ weight · x over its corners.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ContactPoint {
+    /// Cloth vertices, rising; those without weight come last and repeat the first.
+    corners: [u32; 3],
+    /// Positive, and zero for what repeats; they add up to one.
+    weights: [f64; 3],
+    /// Its part of the reference pattern's area \[m²\].
+    pub area: f64,
+    /// Coulomb's coefficient on the body \[–\]: the mean of the fabrics about it.
+    pub friction: f64,
+}
+
+impl ContactPoint {
+    /// The vertices that make it up, with their weights ∂p/∂x.
+    pub fn parts(&self) -> impl Iterator<Item = (usize, f64)> + use<> {
+        let parts = self.corners.into_iter().zip(self.weights);
+        parts
+            .filter(|(_, w)| *w > 0.0)
+            .map(|(v, w)| (v as usize, w))
+    }
+
+    /// Where it is \[m\].
+    pub fn at(&self, x: &[Vec3]) -> Vec3 {
+        self.parts().map(|(v, w)| x[v] * w).sum()
+    }
+
+    /// Σ weight² w over its vertices: what a push at the point moves it by, for the inverse masses
+    /// `w` \[1/kg\].
+    pub fn inverse_mass(&self, w: &[f64]) -> f64 {
+        self.parts().map(|(v, weight)| weight * weight * w[v]).sum()
+    }
+}
+
+/// Pieces in which a grid cuts the sides of a triangle.
+const PIECES: u32 = 2;
+
+/// The points of all triangles of `mesh`, whose sewn corners are `welded`, once each, with areas that
+/// integrate over the pieces into which the grid cuts every triangle, and `friction` of triangles.
+pub(super) fn contact_points(
+    mesh: &PatternMesh,
+    welded: &[[u32; 3]],
+    friction: impl Fn(usize) -> f64,
+) -> Vec<ContactPoint> {
+    // Of every point the corners with their shares, out of PIECES; area, and friction times area.
+    let mut sums: BTreeMap<[(u32, u32); 3], [f64; 2]> = BTreeMap::new();
+    for (t, triangle) in welded.iter().enumerate() {
+        let third = mesh.rest_area(t, &mesh.x_bar) / f64::from(3 * PIECES * PIECES);
+        for i in 0..=PIECES {
+            for j in 0..=PIECES - i {
+                let shares = [PIECES - i - j, i, j];
+                let around = match shares.iter().filter(|s| **s > 0).count() {
+                    1 => 1.0,
+                    2 => 3.0,
+                    _ => 6.0,
+                };
+                let sum = sums.entry(key(*triangle, shares)).or_default();
+                sum[0] += third * around;
+                sum[1] += third * around * friction(t);
+            }
+        }
+    }
+    let point = |(key, [area, sum]): ([(u32, u32); 3], [f64; 2])| ContactPoint {
+        corners: key.map(|(v, _)| v),
+        weights: key.map(|(_, share)| f64::from(share) / f64::from(PIECES)),
+        area,
+        friction: sum / area,
+    };
+    sums.into_iter().map(point).collect()
+}
+
+/// The corners that have a share, rising, and then the first of them again with none.
+fn key(triangle: [u32; 3], shares: [u32; 3]) -> [(u32, u32); 3] {
+    let mut parts = [0, 1, 2].map(|k| (triangle[k], shares[k]));
+    // Those without a share come last.
+    parts.sort_unstable_by_key(|(v, share)| (*share == 0, *v));
+    parts.map(|(v, share)| {
+        if share == 0 {
+            (parts[0].0, 0)
+        } else {
+            (v, share)
+        }
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sim::cloth::fixtures;
+    use approx::assert_relative_eq;
+
+    #[test]
+    fn points_integrate_linear_functions_over_the_cloth() {
+        let (width, height) = (0.6, 0.4);
+        let mesh = fixtures::sheet(6, 4, 0.1);
+        let points = contact_points(&mesh, &mesh.triangles, |_| 0.0);
+        let x: Vec<Vec3> = mesh
+            .x_bar
+            .iter()
+            .map(|p| Vec3::new(p.x, p.y, 0.0))
+            .collect();
+        let total = |f: &dyn Fn(Vec3) -> f64| -> f64 {
+            points
+                .iter()
+                .map(|point| point.area * f(point.at(&x)))
+                .sum()
+        };
+        assert_relative_eq!(total(&|_| 1.0), width * height, max_relative = 1e-12);
+        let first_moment = 0.5 * width * width * height;
+        assert_relative_eq!(total(&|p| p.x), first_moment, max_relative = 1e-12);
+    }
+
+    #[test]
+    fn points_of_a_side_are_shared_by_its_triangles() {
+        let mesh = fixtures::sheet(3, 2, 0.1);
+        let points = contact_points(&mesh, &mesh.triangles, |_| 0.0);
+        // Three sides a triangle, two triangles an inner side; ten outer sides.
+        let sides = usize::midpoint(3 * mesh.triangles.len(), 10);
+        assert_eq!(points.len(), mesh.x_bar.len() + sides);
+    }
+}
