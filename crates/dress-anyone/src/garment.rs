@@ -2,11 +2,13 @@
 
 mod cut;
 pub mod fabrics;
+mod fold;
 mod summary;
 
 use crate::geometry::{Vec2, Vec3};
 use crate::pattern::{Pattern, PatternMesh, triangulate};
 pub use cut::{Cut, FabricZone, cuts, unknown_panels};
+pub use fold::{FoldLine, PressedFold, fold_lines};
 use serde::{Deserialize, Serialize};
 pub use summary::Summary;
 

@@ -19,7 +19,7 @@ mod written;
 use crate::body::Body;
 use crate::cage::CageParams;
 use crate::descent::DescentParams;
-use crate::garment::{Cut, Fabric, FabricZone, Garment, cuts};
+use crate::garment::{Fabric, FabricZone, Garment, PressedFold, cuts, fold_lines, unknown_panels};
 use crate::geometry::{Vec2, Vec3};
 use crate::loss::{LossParams, LossTerms};
 use crate::pattern::Pattern;
@@ -27,7 +27,7 @@ use crate::problem::Problem;
 use crate::report::{Report, StageTime, Status};
 use crate::sim::drape::DrapeProgress;
 use crate::sim::equilibrium::RestStatus;
-use crate::sim::{SimParams, Start, drape};
+use crate::sim::{Cloth, SimParams, Start, drape};
 use crate::transfer::{TransferError, TransferParams};
 use checkpoint::Checkpoint;
 use dress::{HoldParams, drape_on};
@@ -49,6 +49,8 @@ pub struct RefitParams {
     pub fabric: Fabric,
     /// Panels of another fabric or grain.
     pub fabric_zones: Vec<FabricZone>,
+    /// Folds that are pressed along seams.
+    pub folds: Vec<PressedFold>,
     /// What keeps it up.
     pub hold: HoldParams,
     /// The drape.
@@ -67,9 +69,20 @@ pub struct RefitParams {
 }
 
 impl RefitParams {
-    /// What the panels of `garment` are cut from, `[panel]`.
-    pub fn cuts(&self, garment: &Garment) -> Vec<Cut> {
-        cuts(&garment.pattern, &self.fabric, &self.fabric_zones)
+    /// The cloth of `garment`: its panels cut, its folds pressed. What they name must be there.
+    fn cloth(&self, garment: &Garment) -> Cloth {
+        let (pattern, mesh) = (&garment.pattern, &garment.mesh);
+        let cuts = cuts(pattern, &self.fabric, &self.fabric_zones);
+        let mut cloth = Cloth::cut_from(mesh, &cuts);
+        cloth.press(mesh, &fold_lines(pattern, &self.folds).unwrap_or_default());
+        cloth
+    }
+
+    /// Fabrics and folds that are told of something that the pattern does not have.
+    pub fn problems(&self, pattern: &Pattern) -> Vec<Problem> {
+        let mut problems = unknown_panels(pattern, &self.fabric_zones);
+        problems.extend(fold_lines(pattern, &self.folds).err().into_iter().flatten());
+        problems
     }
 }
 
@@ -80,6 +93,7 @@ impl Default for RefitParams {
             outline_tolerance: crate::pattern::outline::TOLERANCE,
             fabric: Fabric::default(),
             fabric_zones: Vec::new(),
+            folds: Vec::new(),
             hold: HoldParams::default(),
             sim: SimParams::default(),
             transfer: TransferParams::default(),

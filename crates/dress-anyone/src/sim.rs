@@ -18,7 +18,7 @@ pub mod material;
 pub mod step;
 pub mod system;
 pub mod trajectory;
-pub use cloth::{Cloth, Hold, Rest};
+pub use cloth::{Cloth, Fold, Hold, Rest};
 pub use differentiable::Differentiable;
 pub use drape::{Drape, Scene, SimParams, Solver, Start, drape};
 pub use material::{Material, OrFabric};

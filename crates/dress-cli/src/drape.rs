@@ -11,7 +11,7 @@ use crate::show::{Shown, contact_sheet};
 use crate::summary;
 use anyhow::Context;
 use dress_anyone::body::Body;
-use dress_anyone::garment::{Garment, unknown_panels};
+use dress_anyone::garment::Garment;
 use dress_anyone::geometry::Vec3;
 use dress_anyone::io::garment::Loaded;
 use dress_anyone::io::output::{Output, check_writable};
@@ -124,9 +124,9 @@ fn read(arguments: &DrapeArguments) -> Result<(Params, Loaded, Body), Failure> {
     if let Some((file, start)) = from.flatten() {
         loaded.garment.drape = Some(same_mesh(&loaded.garment, file, start)?);
     }
-    let unknown = unknown_panels(&loaded.garment.pattern, &params.refit.fabric_zones);
-    if !unknown.is_empty() {
-        return Err(BadInput::new(&arguments.garment, unknown).into());
+    let problems = params.refit.problems(&loaded.garment.pattern);
+    if !problems.is_empty() {
+        return Err(BadInput::new(&arguments.garment, problems).into());
     }
     note_placement(&mut loaded, &body);
     Ok((params, loaded, body))

@@ -6,12 +6,12 @@ mod placed;
 use super::RefitParams;
 use crate::body::Body;
 use crate::body::distance_field::DistanceField;
-use crate::garment::{Cut, Garment};
+use crate::garment::Garment;
 use crate::geometry::Vec3;
 use crate::pattern::{Edge, EdgeId};
 use crate::sim::drape::DrapeProgress;
 use crate::sim::equilibrium::RestStatus;
-use crate::sim::{Assembly, Cloth, Drape, Hold, OrFabric, Scene, SimParams, Start, drape};
+use crate::sim::{Assembly, Drape, Hold, OrFabric, Scene, SimParams, Start, drape};
 pub use placed::lift;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -112,7 +112,7 @@ pub fn drape_on(
         let on = Dressing {
             body,
             surface: &surface,
-            cuts: params.cuts(garment),
+            params,
             hold,
         };
         match &garment.drape {
@@ -152,8 +152,7 @@ const PATIENCE: usize = 4;
 struct Dressing<'a> {
     body: &'a Body,
     surface: &'a DistanceField,
-    /// `[panel]`.
-    cuts: Vec<Cut>,
+    params: &'a RefitParams,
     hold: &'a HoldParams,
 }
 
@@ -168,7 +167,7 @@ impl Dressing<'_> {
         sim: &SimParams,
         observe: &mut dyn FnMut(DrapeProgress) -> bool,
     ) -> Drape {
-        let mut cloth = Cloth::cut_from(&garment.mesh, &self.cuts);
+        let mut cloth = self.params.cloth(garment);
         cloth.holds = holds(garment, placed, self.hold);
         let scene = Scene {
             cloth: &cloth,

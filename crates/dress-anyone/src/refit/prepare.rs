@@ -9,7 +9,7 @@ use crate::body::Body;
 use crate::body::distance_field::DistanceField;
 use crate::cage::Cages;
 use crate::descent::Gradient;
-use crate::garment::{Garment, unknown_panels};
+use crate::garment::Garment;
 use crate::geometry::{Vec2, Vec3};
 use crate::loss::Losses;
 use crate::pattern::resample::resample;
@@ -95,7 +95,7 @@ impl<'a> Prepared<'a> {
         // §4.3, §4.5: the unknowns are the control points of one cage per panel.
         let cages = Cages::enclose(&garment.pattern, mesh, symmetry.as_ref(), &params.cage)
             .map_err(RefitError::Garment)?;
-        let mut cloth = Cloth::cut_from(mesh, &params.cuts(garment));
+        let mut cloth = params.cloth(garment);
         cloth.holds = holds(garment, &x_star, &params.hold);
         Ok(Self {
             garment,
@@ -188,7 +188,7 @@ pub(super) fn on_source(
     clock: &mut Clock,
     observe: &mut Observer<'_>,
 ) -> Result<Vec<Vec3>, RefitError> {
-    let problems = unknown_panels(&garment.pattern, &params.fabric_zones);
+    let problems = params.problems(&garment.pattern);
     if !problems.is_empty() {
         return Err(RefitError::Garment(problems));
     }

@@ -5,7 +5,7 @@
 //! paper's time-stepping adjoint (§3.2) at rest, at the price of one solve.
 
 use super::cloth::{Cloth, GRAVITY, Rest};
-use super::energy::{bend, membrane};
+use super::energy::{bend, fold, membrane};
 use crate::geometry::{Vec2, Vec3};
 
 /// λᵀ ∂f/∂x̄ at positions `x`: membrane, bending, and weight through the lumped masses. Contact
@@ -42,6 +42,16 @@ pub fn rest_pull_back(
         let multipliers = hinge.vertices.map(|a| lambda[a as usize]);
         let sides = hinge.rest.map(|side| side.map(|v| x_bar[v as usize]));
         let by_rest = bend::rest_pull_back(sides, cloth.rigidity(hinge), corners, multipliers);
+        for (v, g) in hinge.rest.iter().flatten().zip(by_rest.iter().flatten()) {
+            hat[*v as usize] += g;
+        }
+    }
+    for (rest, pressed) in rest.folds.iter().zip(&cloth.folds) {
+        let hinge = &pressed.hinge;
+        let corners = hinge.vertices.map(|a| x[a as usize]);
+        let multipliers = hinge.vertices.map(|a| lambda[a as usize]);
+        let sides = hinge.rest.map(|side| side.map(|v| x_bar[v as usize]));
+        let by_rest = fold::rest_pull_back(rest, sides, corners, multipliers);
         for (v, g) in hinge.rest.iter().flatten().zip(by_rest.iter().flatten()) {
             hat[*v as usize] += g;
         }
@@ -85,6 +95,16 @@ pub fn rest_push_forward(
         let sides = hinge.rest.map(|side| side.map(|v| x_bar[v as usize]));
         let motion = hinge.rest.map(|side| side.map(|v| delta[v as usize]));
         let forces = bend::rest_push_forward(sides, cloth.rigidity(hinge), corners, motion);
+        for (a, f) in hinge.vertices.iter().zip(forces) {
+            change[*a as usize] += f;
+        }
+    }
+    for (rest, pressed) in rest.folds.iter().zip(&cloth.folds) {
+        let hinge = &pressed.hinge;
+        let corners = hinge.vertices.map(|a| x[a as usize]);
+        let sides = hinge.rest.map(|side| side.map(|v| x_bar[v as usize]));
+        let motion = hinge.rest.map(|side| side.map(|v| delta[v as usize]));
+        let forces = fold::rest_push_forward(rest, sides, corners, motion);
         for (a, f) in hinge.vertices.iter().zip(forces) {
             change[*a as usize] += f;
         }

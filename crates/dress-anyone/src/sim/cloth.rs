@@ -4,8 +4,10 @@
 mod contacts;
 #[cfg(test)]
 pub(crate) mod fixtures;
+mod press;
 
 use super::energy::bend::RestHinge;
+use super::energy::fold::RestFold;
 use super::energy::membrane::RestTriangle;
 use super::material::Material;
 use crate::garment::{Cut, Fabric};
@@ -13,6 +15,7 @@ use crate::geometry::{Vec2, Vec3};
 use crate::pattern::PatternMesh;
 pub use contacts::ContactPoint;
 use contacts::contact_points;
+pub use press::Fold;
 use std::collections::BTreeMap;
 
 /// Standard gravity \[m/s²\], y up.
@@ -25,8 +28,10 @@ pub struct Cloth {
     pub rest_triangles: Vec<[u32; 3]>,
     /// Cloth vertices of the same triangles.
     pub triangles: Vec<[u32; 3]>,
-    /// Interior edges of the welded mesh.
+    /// Interior edges of the welded mesh, but for folds.
     pub hinges: Vec<Hinge>,
+    /// Those that are pressed.
+    pub folds: Vec<Fold>,
     /// Cloth vertex of each pattern vertex.
     pub sewing: Vec<u32>,
     /// Number of cloth vertices.
@@ -115,6 +120,7 @@ impl Cloth {
         let friction = |t: usize| materials[usize::from(material_of[t])].friction;
         Self {
             hinges: hinges(&mesh.triangles, &triangles),
+            folds: Vec::new(),
             contacts: contact_points(mesh, &triangles, friction),
             thickness,
             rest_triangles: mesh.triangles.clone(),
@@ -158,6 +164,10 @@ impl Cloth {
             .iter()
             .map(|hinge| RestHinge::new(hinge.rest.map(at), self.rigidity(hinge)))
             .collect();
+        let fold = |fold: &Fold| {
+            let rigidity = fold.firmness * self.rigidity(&fold.hinge);
+            RestFold::new(fold.hinge.rest.map(at), rigidity, fold.angle)
+        };
         let mut mass = vec![0.0; self.vertex_count];
         for (t, (rest, triangle)) in triangles.iter().zip(&self.triangles).enumerate() {
             for &a in triangle {
@@ -167,6 +177,7 @@ impl Cloth {
         Rest {
             triangles,
             hinges,
+            folds: self.folds.iter().map(fold).collect(),
             mass,
         }
     }
@@ -179,6 +190,8 @@ pub struct Rest {
     pub triangles: Vec<RestTriangle>,
     /// `[hinge]`.
     pub hinges: Vec<RestHinge>,
+    /// `[fold]`.
+    pub folds: Vec<RestFold>,
     /// Lumped mass \[kg\], `[cloth vertex]`.
     pub mass: Vec<f64>,
 }

@@ -2,6 +2,7 @@
 
 pub mod bend;
 pub mod contact;
+pub mod fold;
 pub mod friction;
 pub mod layers;
 pub mod membrane;

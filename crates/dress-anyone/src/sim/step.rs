@@ -1,13 +1,14 @@
 //! One XPBD time step (paper §3.1; Macklin et al. 2016, with the velocity factor τ).
 //!
 //! x̃ = x + Δt v + Δt² g, then sweeps of (∇C M⁻¹ ∇Cᵀ + α̃) Δλ = −C − α̃λ over membrane, bending,
-//! contact and holds in a fixed order (membrane and bending by colours, in lanes: `stretch`,
+//! folds, holds and contact in a fixed order (membrane and bending by colours, in lanes: `stretch`,
 //! `turn`), then v ← τ (x − x_n)/Δt. It brings placed panels together;
 //! at usual sweep counts its rest state is centimetres too long (METHOD §1.5), so the static solve
 //! follows.
 //!
 //! A step can be recorded on a [`Tape`] and walked back through: [`pull_back`] is its exact adjoint.
 
+mod crease;
 mod lanes;
 pub mod pull_back;
 mod rub;
@@ -84,6 +85,7 @@ pub struct Stepper<'a, S> {
     w: Vec<f64>,
     stretch: Stretch,
     turn: Turn,
+    lambda_fold: Vec<f64>,
     lambda_hold: Vec<f64>,
     /// Keeps layers of cloth apart.
     watch: Watch,
@@ -112,6 +114,8 @@ pub struct Tape {
     membrane: Vec<Visit>,
     /// Δλ of each visit to a hinge.
     bend: Vec<Vec3>,
+    /// Each visit to a fold.
+    folds: Vec<crease::Visit>,
     /// Δλ of each visit to a hold.
     holds: Vec<f64>,
     /// λ after each visit to a contact.
@@ -137,6 +141,7 @@ impl<'a, S: Surface> Stepper<'a, S> {
             stretch: Stretch::new(cloth, rest, &w, params.dt),
             turn: Turn::new(cloth, rest, &w, params.dt),
             w,
+            lambda_fold: vec![0.0; cloth.folds.len()],
             lambda_hold: vec![0.0; cloth.holds.len()],
             cloth,
             rest,
@@ -191,6 +196,7 @@ impl<'a, S: Surface> Stepper<'a, S> {
         }
         self.stretch.reset();
         self.turn.reset();
+        self.lambda_fold.fill(0.0);
         self.lambda_hold.fill(0.0);
         let mut touching = self.touching(&before);
         let wish: Vec<Vec3> = state.x.iter().zip(&before).map(|(x, b)| x - b).collect();
@@ -202,6 +208,7 @@ impl<'a, S: Surface> Stepper<'a, S> {
             };
             self.stretch.sweep(&mut state.x, membrane);
             self.turn.sweep(&mut state.x, bend);
+            self.sweep_folds(&mut state.x, tape.as_deref_mut());
             self.sweep_holds(&mut state.x, tape.as_deref_mut());
             self.watch.sweep(&mut apart, &self.w, &mut state.x);
             self.sweep_contact(&mut touching, &mut state.x, tape.as_deref_mut());
@@ -302,6 +309,7 @@ impl Tape {
     fn clear(&mut self) {
         self.membrane.clear();
         self.bend.clear();
+        self.folds.clear();
         self.holds.clear();
         self.contact.clear();
         self.rubbed.clear();

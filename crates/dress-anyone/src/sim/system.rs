@@ -1,7 +1,7 @@
 //! The total energy U(x; x̄) of cloth on a body, its force and stiffness (METHOD §1.4: membrane,
 //! bending, contact, holds, weight), assembled from the pieces of [`super::energy`].
 
-use super::cloth::{Cloth, ContactPoint, GRAVITY, Rest};
+use super::cloth::{Cloth, ContactPoint, GRAVITY, Hinge, Rest};
 use super::energy::contact::{self, ContactParams, Surface};
 use super::energy::friction::Grip;
 use super::energy::layers::Pair;
@@ -19,6 +19,8 @@ pub struct Assembly {
     triangles: Vec<[Slot; 6]>,
     /// Lower-triangle block pairs of each hinge, in the order of [`PAIRS`].
     hinges: Vec<[Slot; 10]>,
+    /// Lower-triangle block pairs of each fold, likewise.
+    folds: Vec<[Slot; 10]>,
     /// Lower-triangle block pairs of each contact point's vertices, one point after the other.
     contacts: Vec<Slot>,
     vertices: Vec<Slot>,
@@ -48,22 +50,22 @@ impl Assembly {
     pub fn coupling(cloth: &Cloth, pairs: &[Pair]) -> Self {
         let triangles = cloth.triangles.iter().map(<[u32; 3]>::as_slice);
         let hinges = cloth.hinges.iter().map(|h| h.vertices.as_slice());
+        let folds = cloth.folds.iter().map(|f| f.hinge.vertices.as_slice());
         let layers = pairs.iter().map(|p| p.vertices.as_slice());
-        let structure = Structure::new(cloth.vertex_count, triangles.chain(hinges).chain(layers));
+        let elements = triangles.chain(hinges).chain(folds).chain(layers);
+        let structure = Structure::new(cloth.vertex_count, elements);
         let slot = |a: u32, b: u32| structure.slot(a.max(b), a.min(b));
+        let four = |h: &Hinge| {
+            std::array::from_fn(|p| slot(h.vertices[PAIRS[p].0], h.vertices[PAIRS[p].1]))
+        };
         Self {
             triangles: cloth
                 .triangles
                 .iter()
                 .map(|t| std::array::from_fn(|p| slot(t[PAIRS[p].0], t[PAIRS[p].1])))
                 .collect(),
-            hinges: cloth
-                .hinges
-                .iter()
-                .map(|h| {
-                    std::array::from_fn(|p| slot(h.vertices[PAIRS[p].0], h.vertices[PAIRS[p].1]))
-                })
-                .collect(),
+            hinges: cloth.hinges.iter().map(four).collect(),
+            folds: cloth.folds.iter().map(|f| four(&f.hinge)).collect(),
             contacts: (cloth.contacts.iter())
                 .flat_map(|point| pairs_of(point).map(|(a, b, _)| slot(a as u32, b as u32)))
                 .collect(),
@@ -124,6 +126,9 @@ impl<S: Surface> System<'_, S> {
         for (rest, hinge) in self.rest.hinges.iter().zip(&self.cloth.hinges) {
             sum += rest.energy(hinge.vertices.map(|a| x[a as usize]));
         }
+        for (rest, fold) in self.rest.folds.iter().zip(&self.cloth.folds) {
+            sum += rest.energy(fold.hinge.vertices.map(|a| x[a as usize]));
+        }
         for (a, p) in x.iter().enumerate() {
             sum -= self.rest.mass[a] * GRAVITY.dot(p);
         }
@@ -162,6 +167,12 @@ impl<S: Surface> System<'_, S> {
         for (rest, hinge) in self.rest.hinges.iter().zip(&self.cloth.hinges) {
             let forces = rest.force(hinge.vertices.map(|a| x[a as usize]));
             for (a, force) in hinge.vertices.iter().zip(forces) {
+                f[*a as usize] += force;
+            }
+        }
+        for (rest, fold) in self.rest.folds.iter().zip(&self.cloth.folds) {
+            let at = fold.hinge.vertices;
+            for (a, force) in at.iter().zip(rest.force(at.map(|a| x[a as usize]))) {
                 f[*a as usize] += force;
             }
         }
@@ -232,6 +243,17 @@ impl<S: Surface> System<'_, S> {
                 k.add_scalar(*slot, if twice { 2.0 * value } else { value });
             }
         }
+        for (e, fold) in self.cloth.folds.iter().enumerate() {
+            let at = fold.hinge.vertices;
+            let blocks = self.rest.folds[e].stiffness(at.map(|a| x[a as usize]), exactness);
+            for (slot, (i, j)) in assembly.folds[e].iter().zip(PAIRS) {
+                if at[i] >= at[j] {
+                    k.add(*slot, &blocks[i][j]);
+                } else {
+                    k.add(*slot, &blocks[i][j].transpose());
+                }
+            }
+        }
         let mut slots = assembly.contacts.as_slice();
         for (i, point) in self.cloth.contacts.iter().enumerate() {
             let own;
@@ -296,7 +318,7 @@ mod tests {
     #[test]
     fn force_and_stiffness_are_derivatives_of_the_energy() {
         let mesh = fixtures::tube(10, 4, 0.06);
-        let mut cloth = fixtures::patched(&mesh);
+        let mut cloth = fixtures::creased(&mesh);
         cloth.holds.push(Hold {
             vertex: 3,
             height: 0.1,

@@ -361,6 +361,26 @@ fn a_fabric_or_a_panel_that_is_not_there() {
 }
 
 #[test]
+fn folds_that_cannot_be() {
+    let place = Workplace::new();
+    let folds = "[[folds]]\nedge = \"left:0\"\nangle = 170\n\
+                 [[folds]]\nedge = \"left:3\"\nangle = 300\n\
+                 [[folds]]\nedge = \"lft:3\"\nangle = 90\n";
+    place.file("folds.toml", folds);
+    let before = place.names();
+    let ran = place.refit("tee.json", "body.obj", &["--params", "folds.toml"]);
+    let words = [
+        "folds, `left:0`: nothing is sewn to this edge",
+        "`300` must be an angle",
+        "no panel `lft`",
+    ];
+    assert_refused(&place, &before, &ran, &words);
+    place.file("folds.toml", "[[folds]]\nedge = \"left:3\"\nangel = 170\n");
+    let ran = place.refit("tee.json", "body.obj", &["--params", "folds.toml"]);
+    assert_refused(&place, &before, &ran, &["folds.toml: line 3", "`angel`"]);
+}
+
+#[test]
 fn a_command_line_that_makes_no_sense() {
     let place = Workplace::new();
     for line in [

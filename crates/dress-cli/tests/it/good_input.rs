@@ -80,22 +80,19 @@ fn panels_are_draped_in_fabrics_of_their_own() {
         "zone.toml",
         "[[fabric_zones]]\npanels = [\"left\"]\ngrain = 45\n",
     );
-    let garment = |fabrics: &[&str]| {
+    place.file("fold.toml", "[[folds]]\nedge = \"left:3\"\nangle = 60\n");
+    let garment_with = |params, fabrics: &[&str]| {
         let line = ["drape", "--garment", "tee.json", "--body", "body.obj"];
-        let more = [
-            "--resolution",
-            "35",
-            "--out",
-            "out",
-            "--params",
-            "zone.toml",
-        ];
+        let more = ["--resolution", "35", "--out", "out", "--params", params];
         let ran = place.dress(&[&line[..], &more, fabrics].concat());
         assert_eq!(ran.code, 0, "{}", ran.stderr);
         std::fs::read(place.path("out/garment.obj")).unwrap()
     };
+    let garment = |fabrics: &[&str]| garment_with("zone.toml", fabrics);
     let plain = garment(&[]);
     let denim = garment(&["--fabric", "denim"]);
+    let folded = garment_with("fold.toml", &[]);
+    assert!(folded != plain && folded != denim);
     let both = garment(&["--fabric", "denim", "--fabric", "left:rib-knit"]);
     assert!(plain != denim && denim != both && plain != both);
     let zones = &report(&place)["parameters"]["fabric_zones"];

@@ -1,8 +1,9 @@
 //! Small cloths shared by the tests of the simulator.
 
 use super::{Cloth, PatternMesh};
-use crate::garment::{Cut, Fabric};
+use crate::garment::{Cut, Fabric, FoldLine};
 use crate::geometry::{Vec2, Vec3};
+use crate::pattern::EdgeId;
 use crate::sim::material::Material;
 
 /// Unlike along warp and weft, and softer than most: small forces show.
@@ -34,6 +35,18 @@ pub(crate) fn patched(mesh: &PatternMesh) -> Cloth {
     for of in cloth.material_of.iter_mut().step_by(2) {
         *of = 1;
     }
+    cloth
+}
+
+/// A [`tube`] of two fabrics whose seam is pressed.
+pub(crate) fn creased(mesh: &PatternMesh) -> Cloth {
+    let mut cloth = patched(mesh);
+    let seam = FoldLine {
+        edge: EdgeId { panel: 0, edge: 3 },
+        angle: 1.9,
+        firmness: 3.0,
+    };
+    cloth.press(mesh, &[seam]);
     cloth
 }
 

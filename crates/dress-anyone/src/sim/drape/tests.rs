@@ -167,6 +167,18 @@ fn the_gradient_of_a_tube_of_two_fabrics_agrees_with_two_drapes() {
 }
 
 #[test]
+fn the_gradient_of_a_tube_with_a_pressed_seam_agrees_with_two_drapes() {
+    let mut mesh = fixtures::tube(24, 6, 0.025);
+    skew(&mut mesh);
+    let cloth = fixtures::creased(&mesh);
+    let assembly = Assembly::new(&cloth);
+    let params = firm_contact();
+    let scene = scene(&cloth, &assembly, &TIGHT, &params);
+    let x = fixtures::rolled(&mesh, 0.6, 0.11);
+    check_gradient(&scene, &mesh.x_bar, x, 1e-7);
+}
+
+#[test]
 fn a_tube_that_began_short_grows_to_where_one_hangs_that_did_not() {
     let mesh = fixtures::tube(24, 6, 0.025);
     let cloth = Cloth::new(&mesh, &SOFT);

@@ -19,16 +19,16 @@ pub struct RestHinge {
 
 /// What the formulas need of one side: rest edge e and opposite corner w, both from p0.
 #[derive(Clone, Copy, Debug)]
-struct Side {
+pub(super) struct Side {
     e: Vec2,
     w: Vec2,
-    length: f64,
-    area: f64,
+    pub(super) length: f64,
+    pub(super) area: f64,
     foot: f64,
 }
 
 impl Side {
-    fn new([p0, p1, w]: [Vec2; 3]) -> Self {
+    pub(super) fn new([p0, p1, w]: [Vec2; 3]) -> Self {
         let (e, w) = (p1 - p0, w - p0);
         let length = e.norm();
         Self {
@@ -41,7 +41,7 @@ impl Side {
     }
 
     /// Variations of length, area and foot under a motion of (p0, p1, opposite).
-    fn push_forward(&self, [d0, d1, dw]: [Vec2; 3]) -> (f64, f64, f64) {
+    pub(super) fn push_forward(&self, [d0, d1, dw]: [Vec2; 3]) -> (f64, f64, f64) {
         let (de, dw) = (d1 - d0, dw - d0);
         let length = self.e.dot(&de) / self.length;
         let sign = cross2(self.e, self.w).signum();
@@ -54,7 +54,7 @@ impl Side {
 
     /// Gradient by (p0, p1, opposite) of a function whose gradients by length, area and foot are
     /// given.
-    fn pull_back(&self, length: f64, area: f64, foot: f64) -> [Vec2; 3] {
+    pub(super) fn pull_back(&self, length: f64, area: f64, foot: f64) -> [Vec2; 3] {
         let squared = self.length * self.length;
         let turn = 0.5 * cross2(self.e, self.w).signum() * area;
         let e = self.e * (length / self.length - 2.0 * self.foot * foot / squared)

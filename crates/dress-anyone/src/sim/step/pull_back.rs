@@ -10,7 +10,7 @@
 
 use super::{CREASE, State, Stepper, Tape, Touch};
 use crate::geometry::{Mat2, Mat3, Vec2, Vec3};
-use crate::sim::cloth::{Cloth, Rest};
+use crate::sim::cloth::{Cloth, Fold, Rest};
 use crate::sim::energy::contact::Surface;
 use crate::sim::energy::membrane::{
     Elasticity, Mat3x2, constraint_gradient, constraint_mass, symmetric,
@@ -28,6 +28,8 @@ pub struct RestHat {
     k: Vec<[f64; 4]>,
     /// By B/(A₁+A₂), `[hinge]`.
     stiffness: Vec<f64>,
+    /// By w of the folds, `[fold]`.
+    pub(super) fold: Vec<f64>,
     /// By 1/m, `[cloth vertex]`.
     pub(super) w: Vec<f64>,
 }
@@ -38,9 +40,11 @@ pub(super) struct Back<'b> {
     pub(super) x: Vec<Vec3>,
     lambda_membrane: Vec<Vec3>,
     lambda_bend: Vec<Vec3>,
+    pub(super) lambda_fold: Vec<f64>,
     pub(super) x_hat: Vec<Vec3>,
     membrane: Vec<Vec3>,
     bend: Vec<Vec3>,
+    pub(super) folds: Vec<f64>,
     holds: Vec<f64>,
     pub(super) contact: Vec<f64>,
     pub(super) normal: Vec<Vec3>,
@@ -65,8 +69,10 @@ impl<S: Surface> Stepper<'_, S> {
             x_hat: std::mem::take(&mut hat.x),
             lambda_membrane: self.stretch.lambda(),
             lambda_bend: self.turn.lambda(),
+            lambda_fold: self.lambda_fold.clone(),
             membrane: vec![Vec3::zeros(); self.cloth.triangles.len()],
             bend: vec![Vec3::zeros(); self.cloth.hinges.len()],
+            folds: vec![0.0; self.lambda_fold.len()],
             holds: vec![0.0; self.lambda_hold.len()],
             contact: vec![0.0; tape.touching.len()],
             normal: vec![Vec3::zeros(); tape.touching.len()],
@@ -77,6 +83,7 @@ impl<S: Surface> Stepper<'_, S> {
         for sweep in (0..self.params.sweeps).rev() {
             self.pull_back_contact(tape, sweep, &mut back);
             self.pull_back_holds(tape, sweep, &mut back);
+            self.pull_back_folds(tape, sweep, &mut back);
             self.pull_back_bend(tape, sweep, &mut back);
             self.pull_back_membrane(tape, sweep, &mut back);
         }
@@ -299,6 +306,7 @@ impl RestHat {
             area: vec![0.0; cloth.triangles.len()],
             k: vec![[0.0; 4]; cloth.hinges.len()],
             stiffness: vec![0.0; cloth.hinges.len()],
+            fold: vec![0.0; cloth.folds.len()],
             w: vec![0.0; cloth.vertex_count],
         }
     }
@@ -322,6 +330,13 @@ impl RestHat {
         for (e, hinge) in cloth.hinges.iter().enumerate() {
             let sides = hinge.rest.map(|side| side.map(|v| x_bar[v as usize]));
             let by_sides = rest.hinges[e].pull_back(sides, self.k[e], self.stiffness[e]);
+            for (v, g) in hinge.rest.iter().flatten().zip(by_sides.iter().flatten()) {
+                hat[*v as usize] += g;
+            }
+        }
+        for (e, Fold { hinge, .. }) in cloth.folds.iter().enumerate() {
+            let sides = hinge.rest.map(|side| side.map(|v| x_bar[v as usize]));
+            let by_sides = rest.folds[e].pull_back(sides, self.fold[e]);
             for (v, g) in hinge.rest.iter().flatten().zip(by_sides.iter().flatten()) {
                 hat[*v as usize] += g;
             }

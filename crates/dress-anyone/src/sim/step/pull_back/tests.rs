@@ -152,6 +152,14 @@ fn a_step_of_two_fabrics_off_the_grain_has_an_exact_adjoint() {
 }
 
 #[test]
+fn a_step_with_a_pressed_fold_has_an_exact_adjoint() {
+    let mesh = fixtures::tube(5, 2, 0.1);
+    let cloth = fixtures::creased(&mesh);
+    assert_eq!(cloth.folds.len(), 2);
+    check(&mesh, &cloth, &Nothing, three_sweeps(), &rubbing(&mesh));
+}
+
+#[test]
 fn a_step_that_bends_has_an_exact_adjoint() {
     let mesh = fixtures::sheet(1, 1, 0.1);
     let mut cloth = Cloth::new(&mesh, &SOFT);
