@@ -13,7 +13,7 @@
 //! |---|---|---|
 //! | yardstick | 190 a triangle, 75 a hinge | 270 and 320 |
 //! | `step` of one sweep | `sweep`, contact with the body and of layers, searched now and then | |
-//! | `sweep` | 260 a triangle: 170 for its membrane, 60 for each of its 1.5 hinges | 310 and 1.5 × 310 |
+//! | `sweep` | 305 a triangle: 200 for its membrane, 70 for each of its 1.5 hinges | 280 and 1.5 × 350 |
 //! | `pairs` | looks for tangles, and for layers that may touch in a move of 2 mm | |
 //! | `stiffness` | 900 a triangle, 40 a hinge | 9 blocks of 72 a triangle, written |
 //! | `factor` | Σ l² over the columns of L, l their lengths; about n^1.5 | 8 a non-zero of L, at least |
@@ -44,17 +44,22 @@ use dress_anyone::sim::system::System;
 use dress_anyone::sim::{Assembly, Scene, SimParams, Start, drape};
 use std::hint::black_box;
 use std::path::Path;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 use tube::Tube;
 
 /// Cloth vertices aimed for.
 const SIZES: [usize; 3] = [1_000, 4_000, 10_000];
 /// Sweeps in the step that measures them: the rest of the step then hardly counts.
 const SWEEPS: usize = 64;
+/// Runs of which the shortest tells what two threads bring.
+const RUNS: usize = 100;
 /// Force residual at which the tube's drape ends [–].
 const NEARLY_AT_REST: f64 = 1e-3;
 
 fn main() {
+    let one = rayon::ThreadPoolBuilder::new().num_threads(1);
+    one.build_global()
+        .expect("no thread has been asked for yet");
     let results = Path::new(env!("CARGO_TARGET_TMPDIR")).join("hot_loops");
     let mut criterion = Criterion::default()
         .with_measurement(CpuTime::new())
@@ -71,6 +76,19 @@ fn main() {
     }
     criterion.final_summary();
     summary::print(&results, &rows);
+}
+
+/// Least time that went by in many runs on so many threads \[s\].
+fn least_with(threads: usize, run: &mut (impl FnMut() + Send)) -> f64 {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+    let time = || {
+        let start = Instant::now();
+        run();
+        start.elapsed().as_secs_f64()
+    };
+    let mut times = std::iter::repeat_with(time).take(RUNS);
+    pool.expect("a few threads can be had")
+        .install(|| times.by_ref().fold(f64::INFINITY, f64::min))
 }
 
 /// Measures every loop on a tube of about `size` vertices; what the summary should show.
@@ -140,6 +158,15 @@ fn of_size(criterion: &mut Criterion<CpuTime>, size: usize) -> Vec<summary::Row>
             stepper.step(&mut state, 0.0);
         });
     });
+    let mut step = || {
+        state.x.clone_from(&at_rest);
+        stepper.step(&mut state, 0.0);
+    };
+    let [one, two] = [1, 2].map(|threads| least_with(threads, &mut step));
+    println!(
+        "{vertices} cloth vertices: sweeps on two threads {:.2} times as fast",
+        one / two
+    );
     let mut layers = Layers::new(&cloth, params.layers, &at_rest);
     // Every other vertex moves, so that no search serves for the next.
     let moves: Vec<_> = (0..vertices)

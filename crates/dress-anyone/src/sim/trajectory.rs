@@ -12,8 +12,7 @@ use super::drape::{DrapeProgress, Scene, SimParams};
 use super::energy::contact::Surface;
 use super::energy::layers::LayerParams;
 use super::layers::Watch;
-use super::step::pull_back::RestHat;
-use super::step::{State, Stepper, Tape};
+use super::step::{State, Stepper};
 use super::system::System;
 use crate::geometry::{Vec2, Vec3};
 
@@ -115,9 +114,7 @@ impl<'a, S: Surface> Trajectory<'a, S> {
             x: x_hat.to_vec(),
             v: vec![Vec3::zeros(); x_hat.len()],
         };
-        let mut rest_hat = RestHat::none(self.cloth);
         let mut stepper = self.stepper();
-        let mut tape = Tape::default();
         let last = norm(x_hat);
         let mut largest = last;
         for (segment, kept) in self.kept.iter().enumerate().rev() {
@@ -130,13 +127,13 @@ impl<'a, S: Surface> Trajectory<'a, S> {
                 states.push(state);
             }
             for mut state in states.into_iter().rev() {
-                stepper.record(&mut state, &mut tape);
-                stepper.pull_back(&tape, &mut hat, &mut rest_hat);
+                stepper.record(&mut state);
+                stepper.pull_back(&mut hat);
                 largest = largest.max(norm(&hat.x));
             }
         }
         TrajectoryHat {
-            x_bar: rest_hat.pull_back(self.cloth, &self.rest, &self.x_bar),
+            x_bar: stepper.by_rest_shape(&self.x_bar),
             start: hat,
             growth: largest / last,
         }

@@ -9,6 +9,7 @@ use super::{Layers, hold_apart, without_mean};
 use crate::geometry::Vec3;
 use crate::sim::cloth::Cloth;
 use crate::sim::energy::layers::{LayerParams, Pair};
+use crate::sim::step::Apart;
 
 /// Watches over the layers of a cloth that moves.
 #[derive(Clone, Debug)]
@@ -23,18 +24,6 @@ pub struct Watch {
     most: f64,
     /// Steps until tangles are looked for again.
     countdown: usize,
-}
-
-/// Two layers that may touch, or that shall part: Σ g·x ≥ gap, linearised once per step.
-#[derive(Clone, Copy, Debug)]
-pub struct Apart {
-    /// A vertex and a triangle or two edges; or an edge and the triangle it goes through.
-    vertices: [usize; 5],
-    /// g; the last one is zero where there are but four vertices.
-    gradient: [Vec3; 5],
-    gap: f64,
-    alpha_tilde: f64,
-    lambda: f64,
 }
 
 /// Room as part of the mean move of a step, so that pairs last for a few steps.
@@ -64,7 +53,12 @@ impl Watch {
     }
 
     /// Constraints for a step from `x` that wants to move by `wish` \[m\].
-    pub fn constraints(&mut self, x: &[Vec3], wish: &[Vec3], per_time: f64) -> Vec<Apart> {
+    pub(in crate::sim) fn constraints(
+        &mut self,
+        x: &[Vec3],
+        wish: &[Vec3],
+        per_time: f64,
+    ) -> Vec<Apart> {
         if !self.layers.params.on {
             return Vec::new();
         }
@@ -84,8 +78,8 @@ impl Watch {
         }
         let room = 2.0 * farthest.min(self.room);
         let apart = |pair: &Pair| {
-            let [a, b, c, d] = pair.vertices.map(|v| v as usize);
-            let closest = pair.closest([a, b, c, d].map(|v| x[v]));
+            let [a, b, c, d] = pair.vertices;
+            let closest = pair.closest(pair.vertices.map(|v| x[v as usize]));
             let delta = closest.r.norm();
             let [p, q, r, s] = closest.beta.map(|b| closest.r * (b / delta));
             (0.0 < delta && delta < pair.h + room).then_some(Apart {
@@ -93,7 +87,6 @@ impl Watch {
                 gradient: [p, q, r, s, Vec3::zeros()],
                 gap: pair.h,
                 alpha_tilde: per_time / pair.kappa,
-                lambda: 0.0,
             })
         };
         let mut all: Vec<Apart> = self.pairs.iter().filter_map(apart).collect();
@@ -109,40 +102,20 @@ impl Watch {
         self.layers.piercings(x).into_iter().filter_map(move |p| {
             let direction = p.push.try_normalize(1e-6)?;
             let gradient = p.weights.map(|w| direction * w);
-            let now: f64 = (0..5).map(|k| gradient[k].dot(&x[p.vertices[k]])).sum();
+            let now: f64 = (0..5)
+                .map(|k| gradient[k].dot(&x[p.vertices[k] as usize]))
+                .sum();
             Some(Apart {
                 vertices: p.vertices,
                 gradient,
                 gap: now + push * p.push.norm(),
                 alpha_tilde: 0.0,
-                lambda: 0.0,
             })
         })
     }
 
-    /// Pushes apart what is closer than the thickness; `w` are inverse masses \[1/kg\].
-    pub fn sweep(&self, apart: &mut [Apart], w: &[f64], x: &mut [Vec3]) {
-        for pair in apart {
-            let mut c = -pair.gap;
-            let mut inverse_mass = pair.alpha_tilde;
-            for (v, g) in pair.vertices.into_iter().zip(&pair.gradient) {
-                c += g.dot(&x[v]);
-                inverse_mass += w[v] * g.norm_squared();
-            }
-            let wanted = pair.lambda - (c + pair.alpha_tilde * pair.lambda) / inverse_mass;
-            let delta = wanted.max(0.0) - pair.lambda;
-            if delta == 0.0 {
-                continue;
-            }
-            pair.lambda += delta;
-            for (v, g) in pair.vertices.into_iter().zip(&pair.gradient) {
-                x[v] += g * (w[v] * delta);
-            }
-        }
-    }
-
     /// Shortens the step from `before` to `x` so that no layer passes another.
-    pub fn restrain(&self, before: &[Vec3], x: &mut [Vec3]) {
+    pub(in crate::sim) fn restrain(&self, before: &[Vec3], x: &mut [Vec3]) {
         if !self.layers.params.on {
             return;
         }

@@ -13,7 +13,7 @@ use crate::geometry::{Vec3, intersections};
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Piercing {
     /// The ends of the edge, then the corners of the triangle.
-    pub(super) vertices: [usize; 5],
+    pub(super) vertices: [u32; 5],
     /// Weights with which they make up the edge's P less the triangle's P.
     pub(super) weights: [f64; 5],
     /// G, at most 1 long \[–\].
@@ -71,8 +71,7 @@ impl Layers {
             g += r - unit * (direction.dot(&r) / direction.dot(&unit));
         }
         let push = g / g.norm().hypot(FULL_PUSH);
-        let [e0, e1] = self.edges[e].map(|v| v as usize);
-        let [t0, t1, t2] = triangle.map(|v| v as usize);
+        let ([e0, e1], [t0, t1, t2]) = (self.edges[e], triangle);
         let piercing = Piercing {
             vertices: [e0, e1, t0, t1, t2],
             weights: [1.0 - s, s, u + v - 1.0, -u, -v],

@@ -1,6 +1,7 @@
 use super::*;
 use crate::check::{assert_derivative, noise};
 use crate::garment::Fabric;
+use crate::geometry::Vec3;
 use crate::pattern::PatternMesh;
 use crate::sim::cloth::Hold;
 use crate::sim::cloth::fixtures::{self, SOFT};
@@ -17,6 +18,9 @@ const CONE: Cone = Cone {
     flat: 1.1,
     lean: 0.2,
 };
+
+/// Vertices of a part: so few that there are several parts.
+const FEW: usize = 8;
 
 /// One step of a cloth: the derivative of a fixed linear function of the state after it, along one
 /// direction of positions, of velocities and of the rest shape each.
@@ -71,7 +75,7 @@ fn check_with<S: Surface>(
     let value = |state: &State, x_bar: &[Vec2]| -> f64 {
         let rest = cloth.at_rest(x_bar);
         let watch = Watch::new(cloth, off, &state.x);
-        let mut stepper = Stepper::new(cloth, &rest, surface, contact, params, watch);
+        let mut stepper = Stepper::in_parts(cloth, &rest, surface, contact, params, watch, FEW);
         let mut state = state.clone();
         stepper.step(&mut state, 0.0);
         dot(&state.x, &weights) + dot(&state.v, &speeds)
@@ -79,16 +83,15 @@ fn check_with<S: Surface>(
 
     let rest = cloth.at_rest(&mesh.x_bar);
     let watch = Watch::new(cloth, off, &start.x);
-    let mut stepper = Stepper::new(cloth, &rest, surface, contact, params, watch);
-    let (mut tape, mut rest_hat) = (Tape::default(), RestHat::none(cloth));
+    let mut stepper = Stepper::in_parts(cloth, &rest, surface, contact, params, watch, FEW);
     let mut state = start.clone();
-    stepper.record(&mut state, &mut tape);
+    stepper.record(&mut state);
     let mut hat = State {
         x: weights.clone(),
         v: speeds.clone(),
     };
-    stepper.pull_back(&tape, &mut hat, &mut rest_hat);
-    let x_bar_hat = rest_hat.pull_back(cloth, &rest, &mesh.x_bar);
+    stepper.pull_back(&mut hat);
+    let x_bar_hat = stepper.by_rest_shape(&mesh.x_bar);
 
     // Steps of a tenth of a micrometre keep contacts as they are; differences then know the slope to
     // some 1e-8.
@@ -232,4 +235,34 @@ fn a_step_at_the_speed_limit_has_an_exact_adjoint() {
         ..three_sweeps()
     };
     check(&mesh, &cloth, &Nothing, slow, &crumpled(&mesh));
+}
+
+#[test]
+fn the_number_of_threads_changes_no_bit() {
+    let mesh = fixtures::tube(24, 12, 0.03);
+    let cloth = fixtures::patched(&mesh);
+    let rest = cloth.at_rest(&mesh.x_bar);
+    let contact = ContactParams {
+        thickness: 0.01,
+        stiffness: 1e5,
+        friction: OrFabric::Fabric,
+    };
+    let run = || {
+        let mut state = rubbing(&mesh);
+        let watch = Watch::new(&cloth, LayerParams::default(), &state.x);
+        let params = three_sweeps();
+        let mut stepper = Stepper::in_parts(&cloth, &rest, &CONE, contact, params, watch, FEW);
+        for _ in 0..5 {
+            stepper.step(&mut state, 1.0);
+        }
+        stepper.record(&mut state);
+        let mut hat = state.clone();
+        stepper.pull_back(&mut hat);
+        (state.x, hat.x, stepper.by_rest_shape(&mesh.x_bar))
+    };
+    let with = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+        pool.expect("threads").install(run)
+    };
+    assert_eq!(with(1), with(3));
 }
