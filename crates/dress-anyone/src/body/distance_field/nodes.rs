@@ -39,7 +39,7 @@ struct Evens<'a> {
 
 /// Farther from the surface \[m\] odd nodes are means. The stencil of a point within 10 mm, where
 /// contact takes place, has searched nodes only.
-const SEARCHED: f64 = 20e-3;
+pub(super) const SEARCHED: f64 = 20e-3;
 /// Nodes along the side of a brick.
 pub(super) const SIDE: usize = 8;
 /// Nodes of a brick.
@@ -79,11 +79,13 @@ impl Grid {
         reach: f64,
     ) -> Self {
         let (low, high) = body.bounds();
-        let extent = (high - low).add_scalar(2.0 * reach) / (spacing * SIDE as f64);
+        // Whole multiples of the spacing, so that a mirrored body has a mirrored field.
+        let origin = low.map(|x| ((x - reach) / spacing).floor() * spacing);
+        let extent = (high.add_scalar(reach) - origin) / (spacing * SIDE as f64);
         // An empty mesh has no extent.
         let brick_count = [extent.x, extent.y, extent.z].map(|x| x.ceil().max(0.0) as usize);
         let mut grid = Self {
-            origin: low.add_scalar(-reach),
+            origin,
             spacing,
             brick_count,
             stored: Vec::new(),

@@ -39,8 +39,17 @@ impl ContactPoint {
     }
 }
 
-/// Pieces in which a grid cuts the sides of a triangle.
-const PIECES: u32 = 2;
+/// Farthest that points are apart \[m\]: across it a limb of 25 mm radius bulges by half a millimetre.
+const SPACING: f64 = 10e-3;
+
+/// Pieces into which the sides of triangles are cut.
+fn pieces(mesh: &PatternMesh) -> u32 {
+    let count = mesh.triangles.len().max(1) as f64;
+    let areas = (0..mesh.triangles.len()).map(|t| mesh.rest_area(t, &mesh.x_bar));
+    // Of an equilateral triangle of mean size.
+    let side = (4.0 / 3.0_f64.sqrt() * areas.sum::<f64>() / count).sqrt();
+    (side / SPACING).ceil().max(1.0) as u32
+}
 
 /// The points of all triangles of `mesh`, whose sewn corners are `welded`, once each, with areas that
 /// integrate over the pieces into which the grid cuts every triangle, and `friction` of triangles.
@@ -49,13 +58,14 @@ pub(super) fn contact_points(
     welded: &[[u32; 3]],
     friction: impl Fn(usize) -> f64,
 ) -> Vec<ContactPoint> {
-    // Of every point the corners with their shares, out of PIECES; area, and friction times area.
+    let pieces = pieces(mesh);
+    // Of every point the corners with their shares, out of all pieces; area, and friction times area.
     let mut sums: BTreeMap<[(u32, u32); 3], [f64; 2]> = BTreeMap::new();
     for (t, triangle) in welded.iter().enumerate() {
-        let third = mesh.rest_area(t, &mesh.x_bar) / f64::from(3 * PIECES * PIECES);
-        for i in 0..=PIECES {
-            for j in 0..=PIECES - i {
-                let shares = [PIECES - i - j, i, j];
+        let third = mesh.rest_area(t, &mesh.x_bar) / f64::from(3 * pieces * pieces);
+        for i in 0..=pieces {
+            for j in 0..=pieces - i {
+                let shares = [pieces - i - j, i, j];
                 let around = match shares.iter().filter(|s| **s > 0).count() {
                     1 => 1.0,
                     2 => 3.0,
@@ -69,7 +79,7 @@ pub(super) fn contact_points(
     }
     let point = |(key, [area, sum]): ([(u32, u32); 3], [f64; 2])| ContactPoint {
         corners: key.map(|(v, _)| v),
-        weights: key.map(|(_, share)| f64::from(share) / f64::from(PIECES)),
+        weights: key.map(|(_, share)| f64::from(share) / f64::from(pieces)),
         area,
         friction: sum / area,
     };
@@ -99,7 +109,7 @@ mod tests {
     #[test]
     fn points_integrate_linear_functions_over_the_cloth() {
         let (width, height) = (0.6, 0.4);
-        let mesh = fixtures::sheet(6, 4, 0.1);
+        let mesh = fixtures::sheet(12, 8, 0.05);
         let points = contact_points(&mesh, &mesh.triangles, |_| 0.0);
         let x: Vec<Vec3> = mesh
             .x_bar
@@ -119,10 +129,15 @@ mod tests {
 
     #[test]
     fn points_of_a_side_are_shared_by_its_triangles() {
-        let mesh = fixtures::sheet(3, 2, 0.1);
+        let mesh = fixtures::sheet(3, 2, 0.025);
+        assert_eq!(pieces(&mesh), 3);
         let points = contact_points(&mesh, &mesh.triangles, |_| 0.0);
-        // Three sides a triangle, two triangles an inner side; ten outer sides.
+        // Three sides a triangle, two triangles an inner side; ten outer sides. Two points on each side
+        // and one in each triangle.
         let sides = usize::midpoint(3 * mesh.triangles.len(), 10);
-        assert_eq!(points.len(), mesh.x_bar.len() + sides);
+        assert_eq!(
+            points.len(),
+            mesh.x_bar.len() + 2 * sides + mesh.triangles.len()
+        );
     }
 }

@@ -1,8 +1,6 @@
-//! Contact of points of the cloth with the static body: a compliant one-sided constraint (Stuyck &
-//! Chen 2023), U = ½ κ min(d(p) − h, 0)² per point, with κ = κ₀ · (the point's reference area), and
-//! κ |d|³/(6 · 0.1 mm) more inside the body.
-//! The points are vertices and middles of edges ([`crate::sim::cloth::ContactPoint`]): with vertices
-//! alone, toes and collar bones come through between them.
+//! Contact of points of the cloth ([`crate::sim::cloth::ContactPoint`]) with the static body: a compliant
+//! one-sided constraint (Stuyck & Chen 2023), U = ½ κ min(d(p) − h, 0)² per point, with κ = κ₀ · (the
+//! point's reference area), and κ |d − h/2|³/(6 · 0.01 mm) more where d < h/2.
 //!
 //! The distance d comes from a [`Surface`] with a gradient and a Hessian, so force and stiffness
 //! are exact derivatives of the energy, contact curvature included.
@@ -86,17 +84,19 @@ impl ContactParams {
     }
 }
 
-/// Depth inside the body at which it resists twice as steeply \[m\]: taut cloth over a sharp fold
-/// presses too hard for springs that a hem should rest on softly.
-const FIRM: f64 = 1e-4;
+/// Part of the offset h below which contact grows firm: what is left is room for the body's bulge between
+/// points, and taut cloth over a sharp fold presses too hard for springs that a hem rests on softly.
+const FIRM_FROM: f64 = 0.5;
+/// Depth below that at which it resists twice as steeply \[m\].
+const FIRM: f64 = 1e-5;
 
 /// U/κ, −∂U/∂d / κ and ∂²U/∂d² / κ at distance d from the body, where cloth touches it.
 fn response(d: f64, h: f64) -> [f64; 3] {
-    let depth = (-d).max(0.0);
-    let (room, inside) = (h - d, depth * depth / (2.0 * FIRM));
+    let depth = (FIRM_FROM * h - d).max(0.0);
+    let (room, firm) = (h - d, depth * depth / (2.0 * FIRM));
     [
-        0.5 * room * room + inside * depth / 3.0,
-        room + inside,
+        0.5 * room * room + firm * depth / 3.0,
+        room + firm,
         1.0 + depth / FIRM,
     ]
 }

@@ -48,8 +48,8 @@ fn check<S: Surface>(cloth: &Cloth, surface: &S, mesh: &PatternMesh, x: &[Vec3],
         let x = run(&moved).last.x;
         x.iter().zip(&weights).map(|(x, w)| x.dot(w)).sum::<f64>()
     };
-    // 20 nm: so little that no contact switches, and still far above round-off.
-    assert_derivative(value, slope, 2e-8, 1e-3, 1e-6);
+    // 5 nm: so little that no contact switches, and still far above round-off.
+    assert_derivative(value, slope, 5e-9, 1e-3, 1e-6);
 }
 
 #[test]
