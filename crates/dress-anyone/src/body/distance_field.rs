@@ -1,13 +1,13 @@
 //! The signed distance to a body as a smooth function, for a simulator that wants two derivatives.
 //!
-//! Nodes of a grid ([`nodes`]) hold the signed distance of the body's mesh, and make the coefficients of a
+//! Nodes of a grid (`nodes`) hold the signed distance of the body's mesh, and make the coefficients of a
 //! uniform cubic B-spline (C², METHOD's choice for contact): d(p) = Σ_ijk B(u−i) B(v−j) B(w−k) c_ijk.
 //! The spline of the distances themselves would be d + h²/6 ∇²d + O(h⁴), a millimetre too far out at
 //! fingers; coefficients c = d − h²/6 ∇²d make up for it. Derivatives are the spline's own, exact.
 //!
 //! The body is made a solid first (lids on holes). Pseudonormals then tell the sign of every node;
 //! a node they call outside that no path of outside nodes joins to the open air is inside after all:
-//! eyes in the head, arms that overlap the torso. What no cloth gets into is filled ([`crevices`]).
+//! eyes in the head, arms that overlap the torso. What no cloth gets into is filled (`crevices`).
 
 mod crevices;
 mod nodes;

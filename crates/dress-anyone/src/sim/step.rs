@@ -1,11 +1,11 @@
 //! One XPBD time step (paper §3.1; Macklin et al. 2016, with the velocity factor τ).
 //!
 //! x̃ = x + Δt v + Δt² g, then sweeps of (∇C M⁻¹ ∇Cᵀ + α̃) Δλ = −C − α̃λ over membrane, bending, folds,
-//! holds, layers and contact in a fixed order (in parts of the cloth, [`part`], and in lanes,
-//! [`lanes`]), then v ← τ (x − x_n)/Δt. It brings placed panels together; at usual sweep counts its rest state is
+//! holds, layers and contact in a fixed order (in parts of the cloth, `part`, and in lanes,
+//! `lanes`), then v ← τ (x − x_n)/Δt. It brings placed panels together; at usual sweep counts its rest state is
 //! centimetres too long (METHOD §1.5), so the static solve follows.
 //!
-//! A step can be recorded and walked back through: [`pull_back`] is its exact adjoint.
+//! A step can be recorded and walked back through: `pull_back` is its exact adjoint.
 
 mod apart;
 mod contact;

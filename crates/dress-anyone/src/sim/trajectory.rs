@@ -1,7 +1,7 @@
 //! The drape as the paper has it (§3.1, §3.2): a given number of XPBD steps, and the exact adjoint of
 //! all of them.
 //!
-//! Backwards, every step is walked through as it was run, sweep by sweep ([`super::step::pull_back`]):
+//! Backwards, every step is walked through as it was run, sweep by sweep (`step::pull_back`):
 //! from the gradient by the last positions to that by the rest shape, through strain, bending, masses,
 //! contact and its planes. Some states are kept on the way; the steps between them are run again.
 //! The start is given, and does not depend on the rest shape. Layers of cloth do not feel each other
