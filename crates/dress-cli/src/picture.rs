@@ -2,7 +2,7 @@
 //!
 //! [`preview`] is a contact sheet: one column per [`Figure`], one row per [`View`], all at one
 //! scale and cut to the height of the clothes. Wrong sides of cloth are plum, so that an
-//! inside-out sleeve is seen at once. [`tiles`] shows many figures, each at its own scale.
+//! inside-out sleeve is seen at once. [`tiles()`] shows many figures, each at its own scale.
 //! [`pattern_png`] shows a meshed pattern flat.
 
 mod canvas;
