@@ -49,6 +49,9 @@ pub struct Cloth {
     pub material_of: Vec<u16>,
     /// Vertices kept near a height.
     pub holds: Vec<Hold>,
+    /// Springs that draw every vertex towards a place: the place \[m\] and their stiffness \[N/m\]; none
+    /// at all if nothing guides it. U = ½ Σ k |x − place|². Time steps do not know them.
+    pub guide: Vec<(Vec3, f64)>,
     /// Cloth vertices of each triangle, right side in front.
     pub outward: Vec<[u32; 3]>,
     /// The reference pattern \[m\]: what contact of layers is measured by, constant like
@@ -80,6 +83,17 @@ pub struct Hold {
 }
 
 impl Cloth {
+    /// The same cloth, drawn `towards` a shape \[m\] at `rate` \[1/s²\].
+    #[must_use]
+    pub fn guided(&self, towards: Vec<Vec3>, rate: f64) -> Self {
+        let masses = self.at_rest(&self.reference).mass;
+        let springs = towards.into_iter().zip(masses);
+        Self {
+            guide: springs.map(|(end, mass)| (end, rate * mass)).collect(),
+            ..self.clone()
+        }
+    }
+
     /// Prepares the meshed pattern for draping in `fabric`, every panel on the straight grain.
     pub fn new(mesh: &PatternMesh, fabric: &Fabric) -> Self {
         let cut = Cut {
@@ -131,6 +145,7 @@ impl Cloth {
             materials,
             material_of,
             holds: Vec::new(),
+            guide: Vec::new(),
             outward: mesh.outward_triangles(),
             reference: mesh.x_bar.clone(),
         }
