@@ -11,7 +11,7 @@ use super::energy::fold::RestFold;
 use super::energy::membrane::RestTriangle;
 use super::material::Material;
 use crate::garment::{Cut, Fabric};
-use crate::geometry::{Vec2, Vec3};
+use crate::geometry::{Vec2, Vec3, cross2};
 use crate::pattern::PatternMesh;
 pub use contacts::ContactPoint;
 use contacts::contact_points;
@@ -135,7 +135,7 @@ impl Cloth {
         Self {
             hinges: hinges(&mesh.triangles, &triangles),
             folds: Vec::new(),
-            contacts: contact_points(mesh, &triangles, friction),
+            contacts: contact_points(&triangles, |t| mesh.rest_area(t, &mesh.x_bar), friction),
             thickness,
             rest_triangles: mesh.triangles.clone(),
             triangles,
@@ -161,6 +161,17 @@ impl Cloth {
     pub fn rigidity(&self, hinge: &Hinge) -> f64 {
         let [a, b] = hinge.triangles.map(|t| self.material(t as usize).bending);
         if a == b { a } else { 2.0 * a * b / (a + b) }
+    }
+
+    /// What part of each contact point's friction is that of one of the `materials`, `[contact point]`.
+    pub fn friction_shares(&self, material: usize) -> Vec<f64> {
+        let area = |t: usize| {
+            let [a, b, c] = self.reference_corners(t);
+            0.5 * cross2(b - a, c - a)
+        };
+        let own = |t: usize| f64::from(usize::from(self.material_of[t]) == material);
+        let points = contact_points(&self.triangles, area, own);
+        points.into_iter().map(|point| point.friction).collect()
     }
 
     /// Corners of triangle `t` in the reference pattern \[m\].
