@@ -14,25 +14,30 @@
 
 mod bind;
 mod clear;
+mod draped;
 mod ease;
+mod hang;
 mod hold;
 mod layers;
 mod layout;
 mod paint;
 mod relax;
 mod room;
+mod settle;
 
 use crate::body::Body;
-use crate::geometry::mesh::{bounds, vertex_normals};
-use crate::geometry::{ClosestPoint, Vec3};
-use bind::{BodyMap, Carried, smoothstep};
-use clear::{Clearing, at_distance, belongs};
+use crate::geometry::{ClosestPoint, Mat3, Vec3, bounds};
+use bind::{BodyMap, Carried};
+use clear::{Clearing, belongs};
+use draped::Draped;
 pub use ease::{Ease, EaseAt};
+use hold::Rims;
 pub use layout::{Layout, Zone};
 pub use paint::Paint;
 use rayon::prelude::*;
-use relax::{Relaxation, Stencil, rings};
+use relax::{Hold, Kept, Relaxation, Slope, Springs, Stencil};
 use serde::{Deserialize, Serialize};
+use settle::{Ground, Settling};
 
 /// How the drape is carried over.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -114,21 +119,12 @@ pub enum TransferError {
     NotFinite(String),
 }
 
-/// Rounds in full steps; later ones shorten as 1, 1/2, 1/3 …: above a crease of the body the nearest
-/// side may change with every round, and short steps settle between.
-const FULL_ROUNDS: usize = 4;
-/// Distances below which the distance is restored fully, and above which not at all, as shares of the
-/// body's height: 1 and 5 cm on an adult.
-const CLOSE: (f64, f64) = (0.006, 0.03);
-/// Rounds of averaging that free the garment's normals from wrinkles.
-const NORMAL_ROUNDS: usize = 10;
+/// How far a rim that grips may be pulled in, as share of the body's height: 3 cm on an adult.
+const GRIP: f64 = 0.02;
 /// First step of a triangle that meets the body, as share of its height: half a millimetre.
 const STEP: f64 = 3e-4;
 /// Times that a garment which met the body is relaxed again, to even out what was pushed.
 const SMOOTHINGS: usize = 2;
-/// Error of a relaxed vertex, as part of how far one may still move when the loop ends.
-const EXACT: f64 = 1e-2;
-
 /// Carries a drape from `source` to `target`, two bodies of one topology.
 ///
 /// `drape` are the positions of the welded cloth \[m\] that `layout` describes. Equal bodies give back
@@ -142,53 +138,76 @@ pub fn target_shape(
     params: &TransferParams,
 ) -> Result<Target, TransferError> {
     check(drape, &layout.triangles, source, target)?;
-    let triangles = &layout.triangles;
-    let rings = rings(drape.len(), triangles);
-    let on_target = ClosestPoint::new(&target.mesh);
-    let on_source = ClosestPoint::new(&source.mesh);
-    let distance: Vec<f64> = (drape.par_iter())
-        .map(|&x| on_source.signed_distance(x))
-        .collect();
-    let outward = outward(drape, triangles, &rings, &on_source);
+    let surfaces = [source, target].map(|body| ClosestPoint::new(&body.mesh));
+    let [on_source, on_target] = &surfaces;
+    let draped = Draped::new(drape, &layout.triangles, (source, on_source));
     let map = BodyMap::new(&source.mesh, &target.mesh);
     let bound: Vec<Carried> = (0..drape.len())
         .into_par_iter()
-        .map(|v| map.carry(drape[v], outward[v], distance[v], layout.ease[v]))
+        .map(|v| {
+            map.carry(
+                drape[v],
+                draped.facing[v],
+                draped.distance[v],
+                layout.ease[v],
+            )
+        })
         .collect();
-    let (floor, top) = source.mesh.bounds();
-    let height = (top - floor).max();
-    let near = (&bound[..], &distance[..]);
-    let holds = hold::holds(drape, triangles, &rings, near, height, params);
-    let ties = layers::ties(drape, triangles, &rings, &bound, height);
+    let turns: Vec<Mat3> = drape.par_iter().map(|&x| map.turn(x)).collect();
+    let slopes = hang::slopes(&draped, &bound, &turns);
+    let grounds = grounds(
+        &draped,
+        (&bound, &turns),
+        &slopes,
+        layout,
+        &surfaces,
+        params,
+    );
+    let springs = Springs {
+        kept: layout.kept.iter().map(|&e| Kept::of(e, drape)).collect(),
+        ties: layers::ties(
+            drape,
+            &layout.triangles,
+            &draped.rings,
+            &bound,
+            draped.height,
+        ),
+        slopes,
+    };
     let ring = |(v, ring): (usize, &Vec<u32>)| Stencil {
         centre: v as u32,
         around: ring.clone(),
     };
-    let mut stencils: Vec<Stencil> = rings.iter().enumerate().map(ring).collect();
+    let mut stencils: Vec<Stencil> = draped.rings.iter().enumerate().map(ring).collect();
     stencils.extend(layout.line_stencils());
+    let usual: Vec<Hold> = grounds.iter().map(Ground::usual).collect();
     let (low, high) = bounds(drape);
     let settling = Settling {
-        relaxation: Relaxation::new(drape, &stencils, holds, &layout.kept, ties),
-        body: &on_target,
+        relaxation: Relaxation::new(drape, &stencils, &usual, springs),
+        body: on_target,
         bound: &bound,
-        wanted: room::wanted(drape, &distance, &bound, [&on_source, &on_target]),
-        trust: (distance.iter())
-            .map(|d| 1.0 - smoothstep((d / height - CLOSE.0) / (CLOSE.1 - CLOSE.0)))
-            .collect(),
+        grounds,
         still: params.tolerance * (high - low).norm(),
         rounds: params.iterations,
     };
-    let step = STEP * height;
+    let step = STEP * draped.height;
     // Cloth that was in another part's half already may stay there.
     let home = |(carried, x): (&Carried, &Vec3)| {
         let [before, after] = carried.normals;
-        let home = belongs(&on_source, *x, before);
+        let home = belongs(on_source, *x, before);
         if home { after } else { Vec3::zeros() }
     };
     let homes = bound.iter().zip(drape).map(home).collect();
-    let clearing = Clearing::new(&on_target, &target.mesh, triangles, &rings, homes, step);
-    let mut least: Vec<f64> = (settling.wanted.iter())
-        .map(|wanted| wanted.clamp(0.0, params.thickness))
+    let clearing = Clearing::new(
+        on_target,
+        &target.mesh,
+        &layout.triangles,
+        &draped.rings,
+        homes,
+        step,
+    );
+    let mut least: Vec<f64> = (settling.grounds.iter())
+        .map(|ground| ground.wanted.clamp(0.0, params.thickness))
         .collect();
     let mut x: Vec<Vec3> = bound.iter().map(|carried| carried.point).collect();
     let (iterations, converged) = settling.settle(&mut x, &least);
@@ -211,53 +230,36 @@ pub fn target_shape(
     })
 }
 
-/// The loop of relaxing and rebinding.
-struct Settling<'a> {
-    relaxation: Relaxation,
-    body: &'a ClosestPoint,
-    bound: &'a [Carried],
-    /// Distances to the body \[m\], and how far each is to be restored \[–\].
-    wanted: Vec<f64>,
-    trust: Vec<f64>,
-    /// The loop ends when nothing moves farther \[m\].
-    still: f64,
-    rounds: usize,
-}
-
-impl Settling<'_> {
-    /// Moves `x` to where it stays; the rounds that took, and whether they were enough.
-    fn settle(&self, x: &mut [Vec3], least: &[f64]) -> (usize, bool) {
-        for round in 0..self.rounds {
-            let z: Vec<Vec3> = (0..x.len())
-                .into_par_iter()
-                .map(|v| self.pull(v, x[v], least[v]))
-                .collect();
-            let relaxed = self.relaxation.relax(&z, x, EXACT * self.still);
-            let step = 1.0 / (1 + round.saturating_sub(FULL_ROUNDS)) as f64;
-            let mut farthest = 0.0_f64;
-            for (x, relaxed) in x.iter_mut().zip(relaxed) {
-                let move_ = (relaxed - *x) * step;
-                farthest = farthest.max(move_.norm());
-                *x += move_;
-            }
-            if farthest <= self.still {
-                return (round + 1, true);
-            }
-        }
-        (self.rounds, false)
-    }
-
-    /// Where vertex `v`, now at `x`, is pulled to: along the body to where it is bound, across the body to
-    /// its distance.
-    fn pull(&self, v: usize, x: Vec3, least: f64) -> Vec3 {
-        let (bound, trust, wanted) = (&self.bound[v], self.trust[v], self.wanted[v]);
-        let start = bound.point.lerp(&x, trust);
-        let restored = at_distance(self.body, start, |now| {
-            (now + trust * (wanted - now)).max(least)
-        });
-        let normal = bound.normals[1];
-        bound.point + normal * normal.dot(&(restored - bound.point))
-    }
+/// How each vertex stands to the target body.
+fn grounds(
+    draped: &Draped<'_>,
+    (bound, turns): (&[Carried], &[Mat3]),
+    slopes: &[Slope],
+    layout: &Layout,
+    surfaces: &[ClosestPoint; 2],
+    params: &TransferParams,
+) -> Vec<Ground> {
+    let touching = hold::touching(draped);
+    let across = |v: usize| {
+        let free = turns[v] * draped.facing[v];
+        let across = free.lerp(&bound[v].normals[1], touching[v]);
+        across.try_normalize(1e-9).unwrap_or_else(Vec3::zeros)
+    };
+    let across: Vec<Vec3> = (0..bound.len()).map(across).collect();
+    let rims = Rims::new(draped);
+    let lines = (&rims, &layout.lines[..]);
+    let firmness = hold::firmness(draped, lines, (bound, &across), params);
+    let pressures = hang::pressures(draped, slopes);
+    let wanted = room::wanted(draped.x, &draped.distance, bound, surfaces);
+    let ground = |v: usize| Ground {
+        across: across[v],
+        touching: touching[v],
+        wanted: wanted[v],
+        pressure: pressures[v] * touching[v]
+            + rims.grips[v] * firmness[v].touching * GRIP * draped.height,
+        firmness: firmness[v],
+    };
+    (0..bound.len()).map(ground).collect()
 }
 
 fn check(
@@ -287,27 +289,6 @@ fn check(
         }
     }
     Ok(())
-}
-
-/// Unit directions the cloth looks, freed from wrinkles, away from the body on the whole.
-fn outward(
-    drape: &[Vec3],
-    triangles: &[[u32; 3]],
-    rings: &[Vec<u32>],
-    body: &ClosestPoint,
-) -> Vec<Vec3> {
-    let mut normals = vertex_normals(drape, triangles);
-    for _ in 0..NORMAL_ROUNDS {
-        normals = (rings.iter().zip(&normals))
-            .map(|(ring, own)| own + ring.iter().map(|&i| normals[i as usize]).sum::<Vec3>())
-            .map(|sum| sum.try_normalize(0.0).unwrap_or_else(Vec3::zeros))
-            .collect();
-    }
-    // The winding of a whole garment may be inside out.
-    let agreement: f64 = (drape.iter().zip(&normals))
-        .filter_map(|(&x, n)| Some(body.pseudonormal(&body.query(x, f64::INFINITY)?).dot(n)))
-        .sum();
-    normals.iter().map(|n| n * agreement.signum()).collect()
 }
 
 #[cfg(test)]

@@ -35,8 +35,6 @@ pub enum Command {
     Refit(RefitArguments),
     /// Compare the gradient of a refit's loss with differences of complete drapes.
     CheckGradient(CheckGradientArguments),
-    /// Change a pattern at random, and search for the change from its drape on another body alone.
-    CheckRecovery(CheckRecoveryArguments),
     /// Carry a garment's drape to another body: the shape that a refit aims for, without a pattern.
     Transfer(TransferArguments),
     /// Drape a garment on a body.
@@ -107,20 +105,6 @@ pub struct CheckGradientArguments {
     pub directions: NonZeroUsize,
 }
 
-/// `dress check-recovery`.
-#[derive(Debug, Args)]
-pub struct CheckRecoveryArguments {
-    /// Garment, bodies, and how.
-    #[command(flatten)]
-    pub fitting: FittingArguments,
-    /// How much panels are stretched, sheared and bent at most, as a part of their size
-    #[arg(long, value_name = "PART", value_parser = positive, default_value = "0.15")]
-    pub change: f64,
-    /// Which random change
-    #[arg(long, value_name = "N", default_value = "1")]
-    pub seed: usize,
-}
-
 /// `dress drape`.
 #[derive(Debug, Args)]
 pub struct DrapeArguments {
@@ -150,7 +134,7 @@ pub struct DrapeArguments {
 /// `dress sheet`.
 #[derive(Debug, Args)]
 pub struct SheetArguments {
-    /// Folders that `dress drape` wrote
+    /// Folders that `dress drape` or `dress transfer` wrote
     #[arg(value_name = "FOLDER", required = true)]
     pub folders: Vec<PathBuf>,
     /// Garments in a row

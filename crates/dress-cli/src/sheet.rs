@@ -1,4 +1,4 @@
-//! `dress sheet`: what `dress drape` wrote for many garments, in one picture.
+//! `dress sheet`: what `dress drape` and `dress transfer` wrote for many garments, in one picture.
 
 use crate::arguments::SheetArguments;
 use crate::failure::Failure;
@@ -30,7 +30,7 @@ const AS_WRITTEN: GarmentOptions = GarmentOptions {
     },
 };
 
-/// A drape as its folder has it.
+/// A drape, or a target shape, as its folder has it.
 struct Draped {
     name: String,
     note: String,
@@ -77,25 +77,30 @@ pub fn run(arguments: &SheetArguments) -> Result<String, Failure> {
     Ok(format!("Picture written to {}\n", written[0].display()))
 }
 
-/// Reads a folder that `dress drape` wrote.
+/// Reads a folder that `dress drape` or `dress transfer` wrote.
 fn draped(folder: &Path) -> Result<Draped, BadInput> {
     let file = folder.join("report.json");
     let report = json::parse(&file, &read_capped(&file, LIMIT)?)?;
     let foreign = || {
-        let text = "this is no report of `dress drape`; name the folders that it wrote";
+        let text = "this is no report of `dress drape` or `dress transfer`; name the folders that they wrote";
         BadInput::one(&file, Problem::whole(text))
     };
-    let text = |name: &str, value: &serde_json::Value| {
-        value[name].as_str().map(str::to_owned).ok_or_else(foreign)
+    let text = |value: &serde_json::Value| value.as_str().map(str::to_owned).ok_or_else(foreign);
+    let count = |value: &serde_json::Value| value.as_u64().ok_or_else(foreign);
+    let through_body = count(&report["through_body"])?;
+    let (note, body, cloth) = if report["target_body"].is_object() {
+        let through_itself = count(&report["through_itself"][1])?;
+        let turned_over = count(&report["turned_over"])?;
+        let note = format!("{through_body} / {through_itself}, {turned_over} turned over");
+        (note, folder.join("body.obj"), "target.obj")
+    } else {
+        let through_itself = count(&report["through_itself"])?;
+        let status = text(&report["status"])?;
+        let note = format!("{status}, {through_body} / {through_itself}");
+        let body = text(&report["body"]["file"])?;
+        (note, body.into(), "garment.obj")
     };
-    let count = |name: &str| report[name].as_u64().ok_or_else(foreign);
-    let [through_body, through_itself] = [count("through_body")?, count("through_itself")?];
-    let note = format!(
-        "{}, {through_body} / {through_itself}",
-        text("status", &report)?
-    );
-    let body = text("file", &report["body"])?;
-    let garment = Input::File(&folder.join("garment.obj"))
+    let garment = Input::File(&folder.join(cloth))
         .garment(&AS_WRITTEN)?
         .garment;
     Ok(Draped {
@@ -106,6 +111,6 @@ fn draped(folder: &Path) -> Result<Draped, BadInput> {
             .into_owned(),
         note,
         garment,
-        body: Input::File(Path::new(&body)).body(&BodyOptions::default())?,
+        body: Input::File(&body).body(&BodyOptions::default())?,
     })
 }

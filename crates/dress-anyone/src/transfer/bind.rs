@@ -7,7 +7,8 @@
 //!
 //! F_k is how the surface around triangle k deforms, averaged over a few centimetres along the body:
 //! along the surface its stretch, across it rotation times what becomes of the ease, e(g), where g is
-//! the size ratio of the body there ([`super::ease`]).
+//! the size ratio of the body there ([`super::ease`]). How the body turns at large, over a
+//! reach that knows trunk and limbs but no bulges, is told apart from that.
 
 use super::ease::EaseAt;
 use crate::geometry::bvh::Bvh;
@@ -20,6 +21,10 @@ pub(super) struct BodyMap {
     pieces: Vec<Piece>,
     /// Half width of the patch under a point on the surface \[m\].
     width: f64,
+    /// Some of the triangles, all over the body: centre on the source, and moments.
+    samples: Vec<(Vec3, Moments)>,
+    /// Reach of what the body does at large \[m\].
+    reach: f64,
 }
 
 /// A triangle of both bodies.
@@ -34,6 +39,8 @@ struct Piece {
 struct Deformation {
     along: Mat3,
     across: Mat3,
+    /// R.
+    turn: Mat3,
     /// ln g.
     growth: f64,
 }
@@ -67,6 +74,11 @@ pub(super) struct Carried {
 /// Patch width on the surface, as a share of the body's height: 2.5 cm on an adult. Narrower follows
 /// the body's details, wider is smoother.
 const WIDTH: f64 = 0.015;
+/// How far what the body does at large reaches, as share of its height: 50 cm on an adult, so that
+/// the bulges of a trunk do not count and the turn of an arm does.
+const REACH: f64 = 0.3;
+/// Triangles that tell what the body does at large, about.
+const SAMPLES: usize = 2000;
 /// How much wider the patch grows per distance from the body.
 const SPREAD: f64 = 1.2;
 /// Share of the patch's spread below which a direction counts as across the surface.
@@ -99,10 +111,35 @@ impl BodyMap {
             }
         };
         let pieces = tree.order().iter().map(piece).collect();
+        let centre = |t: usize| before[t].iter().sum::<Vec3>() / 3.0;
+        let stride = (before.len() / SAMPLES).max(1);
         Self {
             tree,
             pieces,
             width,
+            samples: (0..before.len())
+                .step_by(stride)
+                .map(|t| (centre(t), moments[t]))
+                .collect(),
+            reach: REACH * (high - low).max(),
+        }
+    }
+
+    /// How the body around `x` turns at large.
+    pub(super) fn turn(&self, x: Vec3) -> Mat3 {
+        let mut reach = self.reach;
+        loop {
+            let mut sum = Moments::NONE;
+            for (centre, moments) in &self.samples {
+                let nearness = 1.0 - (x - centre).norm_squared() / (reach * reach);
+                if nearness > 0.0 {
+                    sum.add(moments, nearness * nearness);
+                }
+            }
+            if sum.size_after > 0.0 {
+                return sum.deformation().turn;
+            }
+            reach *= 2.0;
         }
     }
 
@@ -223,15 +260,17 @@ impl Moments {
             return Deformation {
                 along: Mat3::zeros(),
                 across: Mat3::identity(),
+                turn: Mat3::identity(),
                 growth: 0.0,
             };
         }
-        let rotation = rotation_of(self.map / growth + self.turn);
+        let turn = rotation_of(self.map / growth + self.turn);
         let resistance = self.spread + Mat3::identity() * (THIN * size);
         let inverse = resistance.try_inverse().unwrap_or_else(Mat3::zeros);
         Deformation {
             along: self.map * inverse,
-            across: rotation * (Mat3::identity() - self.spread * inverse),
+            across: turn * (Mat3::identity() - self.spread * inverse),
+            turn,
             growth: growth.ln(),
         }
     }

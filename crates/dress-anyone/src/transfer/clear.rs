@@ -195,21 +195,25 @@ pub(super) fn belongs(body: &ClosestPoint, x: Vec3, home: Vec3) -> bool {
 }
 
 /// `x` moved along the body's normal to the signed distance `wanted(its distance now)`.
-pub(super) fn at_distance(body: &ClosestPoint, x: Vec3, wanted: impl Fn(f64) -> f64) -> Vec3 {
-    let Some(foot) = body.query(x, f64::INFINITY) else {
-        return x;
-    };
+fn at_distance(body: &ClosestPoint, x: Vec3, wanted: impl Fn(f64) -> f64) -> Vec3 {
+    let moved = |(now, outward): (f64, Vec3)| x + outward * (wanted(now) - now);
+    above(body, x).map_or(x, moved)
+}
+
+/// The signed distance of `x` to the body, and the direction in which it grows.
+pub(super) fn above(body: &ClosestPoint, x: Vec3) -> Option<(f64, Vec3)> {
+    let foot = body.query(x, f64::INFINITY)?;
     let now = body.signed(x, &foot);
     // On the surface the offset has no direction.
-    let normal = (x - foot.point)
+    let outward = (x - foot.point)
         .try_normalize(1e-9)
         .map_or_else(|| body.pseudonormal(&foot), |n| n * now.signum());
-    x + normal * (wanted(now) - now)
+    Some((now, outward))
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::relax::rings;
+    use super::super::draped::rings;
     use super::*;
     use crate::fixture::add_box;
     use crate::geometry::closest_point::tests::sphere;

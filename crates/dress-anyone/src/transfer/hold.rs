@@ -3,91 +3,158 @@
 //! Stencils of edge length h that carry a displacement u cost about ½ · 0.094 |h² u″|² a vertex (regular
 //! rings of six), a hold ½ m |u|². Together they let through what is longer than ℓ = h (0.094/m)^¼ and
 //! even out what is shorter, so holds are given as lengths ℓ and are the same for any mesh. Across
-//! the body ℓ is short: the garment's distance to it is the fit. Along the body it is long: the places of
-//! cloth follow the body's proportions, not how its surface slides, which no cloth follows. Rims are
-//! where the design says, and are held closer.
+//! the body ℓ is short where cloth touches it: the distance to the body is the fit. Elsewhere cloth is held by
+//! its slopes ([`super::hang`]), and to its place by next to nothing. Along the body, lines are where the
+//! design says: hems, seams and necklines are held at right angles to themselves. Between them cloth is
+//! stretched as evenly as the stencils will; it does not follow how the skin slides.
 
 use super::TransferParams;
 use super::bind::{Carried, smoothstep};
-use super::relax::Hold;
+use super::draped::Draped;
+use super::relax::{FLEXIBILITY, Hold};
 use crate::geometry::Vec3;
+use crate::geometry::groups::Groups;
 
-/// Share of the body's height beyond which cloth hangs: 6 cm on an adult.
-const HANGING: f64 = 0.035;
-/// ℓ across, of hanging cloth, as share of the body's height.
-const LOOSE: f64 = 0.12;
-/// Rims this close, as share of the body's height, grip it: waistbands, cuffs, collars. 1.5 cm.
+/// Cloth this close to the body touches it, and from the second distance on does not, as shares of the body's
+/// height: 4 and 15 mm on an adult.
+const TOUCHING: (f64, f64) = (0.0024, 0.009);
+/// ℓ across, of cloth that does not touch, as share of the body's height.
+const LOOSE: f64 = 0.25;
+/// ℓ along, off the lines, as share of the body's height: 9 cm. Longer ones even cloth out more, and lose more of
+/// its place on the way there and back.
+const DRIFT: f64 = 0.05;
+/// Rims this close, as share of the body's height, grip it if most of the rim does: waistbands, cuffs, collars.
+/// 1.5 cm.
 const GRIP: f64 = 0.009;
-/// ℓ along, of a rim that hangs, as part of other cloth's.
+/// Shares of a rim that are near below which it does not grip, and from which on it does.
+const MOST: (f64, f64) = (0.5, 0.8);
+/// ℓ of a rim, as part of a seam's.
 const RIM: f64 = 0.5;
-/// ℓ along and across, of a rim that grips, as part of other cloth's.
+/// ℓ of a rim that grips, as part of other cloth's.
 const GRIPPING: f64 = 0.3;
 
-/// The holds of cloth `x` \[m\] that is `distance` \[m\] away from a body of this `height` \[m\].
-pub(super) fn holds(
-    x: &[Vec3],
-    triangles: &[[u32; 3]],
-    rings: &[Vec<u32>],
-    (bound, distance): (&[Carried], &[f64]),
-    height: f64,
+/// How firmly a vertex is held, beside the stencils \[–\].
+#[derive(Clone, Copy)]
+pub(super) struct Firmness {
+    /// Across the body, of what touches it.
+    pub(super) touching: f64,
+    /// Across the body, of all.
+    loose: f64,
+    /// Along the body.
+    along: f64,
+    /// At right angles to a line, along the body: direction times root.
+    line: Vec3,
+}
+
+impl Firmness {
+    /// The hold of a vertex that does not touch the body, where `across` points away from it.
+    pub(super) fn loose(&self, across: Vec3) -> Hold {
+        Hold::from_diagonal_element(self.along)
+            + across * across.transpose() * (self.loose - self.along)
+            + self.line * self.line.transpose()
+    }
+}
+
+/// The share by which each vertex touches the body.
+pub(super) fn touching(draped: &Draped<'_>) -> Vec<f64> {
+    let share = |d: &f64| {
+        let d = d / draped.height;
+        1.0 - smoothstep((d - TOUCHING.0) / (TOUCHING.1 - TOUCHING.0))
+    };
+    draped.distance.iter().map(share).collect()
+}
+
+/// The firmness of cloth that is carried to `bound`, where `across` points away from the body, with these seams.
+pub(super) fn firmness(
+    draped: &Draped<'_>,
+    (rims, seams): (&Rims, &[Vec<u32>]),
+    (bound, across): (&[Carried], &[Vec3]),
     params: &TransferParams,
-) -> Vec<Hold> {
-    let sizes = sizes(x, rings);
-    let on_rim = on_rim(x.len(), triangles);
-    let held = |v: usize| {
+) -> Vec<Firmness> {
+    let pairs = seams.iter().flat_map(|line| line.windows(2));
+    let along_seams = along(bound, pairs.map(|pair| [pair[0], pair[1]]));
+    let along_rims = along(bound, rims.sides.iter().copied());
+    let of_one = |v: usize| {
         let blend = |from: f64, to: f64, t: f64| from + (to - from) * t;
-        let hanging = smoothstep(distance[v] / (HANGING * height));
-        let grips = 1.0 - smoothstep(distance[v] / (GRIP * height));
-        let (rim, grip) = if on_rim[v] {
-            (blend(RIM, GRIPPING, grips), blend(1.0, GRIPPING, grips))
-        } else {
-            (1.0, 1.0)
-        };
-        let firmness = |share: f64| 0.094 * (sizes[v] / (share * height)).powi(4);
-        Hold {
-            normal: bound[v].normals[1],
-            across: firmness(grip * blend(params.spacing, LOOSE.max(params.spacing), hanging)),
-            along: firmness(rim * params.place),
+        let firmness =
+            |share: f64| FLEXIBILITY * (draped.sizes[v] / (share * draped.height)).powi(4);
+        let [rim, seam] = [&along_rims, &along_seams].map(|along| along[v].try_normalize(1e-9));
+        let part = if rim.is_some() { RIM } else { 1.0 };
+        let line = rim.or(seam).unwrap_or_else(Vec3::zeros);
+        let grip = blend(1.0, GRIPPING, rims.grips[v]);
+        Firmness {
+            touching: firmness(grip * params.spacing),
+            loose: firmness(LOOSE),
+            along: firmness(grip * blend(DRIFT, params.place, rims.grips[v])),
+            line: across[v].cross(&line) * firmness(part * params.place).sqrt(),
         }
     };
-    (0..x.len()).map(held).collect()
+    (0..bound.len()).map(of_one).collect()
 }
 
-/// Mean length of the edges around each vertex \[m\]; never far below the usual, for slivers and
-/// loose vertices must be held too.
-fn sizes(x: &[Vec3], rings: &[Vec<u32>]) -> Vec<f64> {
-    let size = |(v, ring): (usize, &Vec<u32>)| {
-        let sum: f64 = ring.iter().map(|&i| (x[i as usize] - x[v]).norm()).sum();
-        sum / ring.len().max(1) as f64
-    };
-    let sizes: Vec<f64> = rings.iter().enumerate().map(size).collect();
-    let mean = sizes.iter().sum::<f64>() / sizes.len().max(1) as f64;
-    sizes.iter().map(|size| size.max(0.5 * mean)).collect()
-}
-
-/// Whether each vertex is on an edge that has one triangle only.
-fn on_rim(vertex_count: usize, triangles: &[[u32; 3]]) -> Vec<bool> {
-    let sides_of = |&[a, b, c]: &[u32; 3]| [[a, b], [b, c], [c, a]];
-    let mut sides: Vec<[u32; 2]> = triangles.iter().flat_map(sides_of).collect();
-    for side in &mut sides {
-        side.sort_unstable();
+/// Directions of these edges at each vertex, where it is carried to; zero at vertices without one.
+fn along(bound: &[Carried], edges: impl Iterator<Item = [u32; 2]>) -> Vec<Vec3> {
+    let mut along = vec![Vec3::zeros(); bound.len()];
+    for edge in edges {
+        let [a, b] = edge.map(|v| v as usize);
+        let side = bound[b].point - bound[a].point;
+        along[a] += side;
+        along[b] += side;
     }
-    sides.sort_unstable();
-    let mut on_rim = vec![false; vertex_count];
-    for run in sides.chunk_by(|a, b| a == b).filter(|run| run.len() == 1) {
-        for v in run[0] {
-            on_rim[v as usize] = true;
+    along
+}
+
+/// The rims of a cloth: edges that have one triangle only.
+pub(super) struct Rims {
+    sides: Vec<[u32; 2]>,
+    /// How far each vertex is on a rim that grips the body \[–\].
+    pub(super) grips: Vec<f64>,
+}
+
+impl Rims {
+    /// Of a draped cloth. A rim grips where it is near the body, if most of it is.
+    pub(super) fn new(draped: &Draped<'_>) -> Self {
+        let Draped {
+            triangles,
+            distance,
+            height,
+            ..
+        } = draped;
+        let sides_of = |&[a, b, c]: &[u32; 3]| [[a, b], [b, c], [c, a]];
+        let mut sides: Vec<[u32; 2]> = triangles.iter().flat_map(sides_of).collect();
+        sides.sort_unstable_by_key(|&[a, b]| [a.min(b), a.max(b)]);
+        let same = |[a, b]: &[u32; 2], [c, d]: &[u32; 2]| (a, b) == (d, c) || (a, b) == (c, d);
+        let runs = sides.chunk_by(same).filter(|run| run.len() == 1);
+        let sides: Vec<[u32; 2]> = runs.map(|run| run[0]).collect();
+        let near = |v: u32| 1.0 - smoothstep(distance[v as usize] / (GRIP * height));
+        let mut rims = Groups::new(distance.len());
+        for side in &sides {
+            rims.join(*side);
         }
+        // Per rim, under its least vertex.
+        let mut sums = vec![(0.0, 0.0); distance.len()];
+        for side in &sides {
+            let (sum, count) = &mut sums[rims.first_of(side[0]) as usize];
+            *sum += near(side[0]) + near(side[1]);
+            *count += 2.0;
+        }
+        let mut grips = vec![0.0; distance.len()];
+        for v in sides.iter().flatten() {
+            let (sum, count) = sums[rims.first_of(*v) as usize];
+            let most = smoothstep((sum / count - MOST.0) / (MOST.1 - MOST.0));
+            grips[*v as usize] = near(*v) * most;
+        }
+        Self { sides, grips }
     }
-    on_rim
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::relax::{Relaxation, Stencil, rings};
+    use super::super::draped::rings;
+    use super::super::relax::{Relaxation, Springs, Stencil};
     use super::*;
 
-    /// How much of a displacement of a flat cloth with this wavelength is left \[–\].
+    /// How much of a displacement across a flat cloth with this wavelength is left \[–\].
     fn left_of_a_wave(edge: f64, wavelength: f64, params: &TransferParams) -> f64 {
         let (columns, rows) = ((1.0 / edge) as u32, (0.5 / edge) as u32);
         let mut x = Vec::new();
@@ -107,7 +174,15 @@ mod tests {
                 }
             }
         }
-        let rings = rings(x.len(), &triangles);
+        let draped = Draped {
+            x: &x,
+            triangles: &triangles,
+            sizes: vec![edge; x.len()],
+            distance: vec![0.0; x.len()],
+            facing: vec![Vec3::y(); x.len()],
+            height: 1.0,
+            rings: rings(x.len(), &triangles),
+        };
         let bound = |p: &Vec3| Carried {
             point: *p,
             ease: 1.0,
@@ -115,16 +190,24 @@ mod tests {
             map: crate::geometry::Mat3::identity(),
         };
         let bound: Vec<Carried> = x.iter().map(bound).collect();
-        let distance = vec![0.0; x.len()];
-        let holds = holds(&x, &triangles, &rings, (&bound, &distance), 1.0, params);
+        let rims = Rims {
+            sides: Vec::new(),
+            grips: vec![0.0; x.len()],
+        };
+        let firmness = firmness(&draped, (&rims, &[]), (&bound, &draped.facing), params);
+        let across = Vec3::y() * Vec3::y().transpose();
+        let hold = |f: &Firmness| f.loose(Vec3::y()) + across * f.touching;
+        let holds: Vec<Hold> = firmness.iter().map(hold).collect();
         let stencil = |(v, ring): (usize, &Vec<u32>)| Stencil {
             centre: v as u32,
             around: ring.clone(),
         };
-        let stencils: Vec<Stencil> = rings.iter().enumerate().map(stencil).collect();
+        let stencils: Vec<Stencil> = draped.rings.iter().enumerate().map(stencil).collect();
         let wave = |p: &Vec3| 1e-3 * (std::f64::consts::TAU * p.x / wavelength).cos();
-        let z: Vec<Vec3> = x.iter().map(|p| p + Vec3::x() * wave(p)).collect();
-        let relaxed = Relaxation::new(&x, &stencils, holds, &[], vec![]).relax(&z, &x, 1e-9);
+        let z: Vec<Vec3> = x.iter().map(|p| p + Vec3::y() * wave(p)).collect();
+        let relaxation = Relaxation::new(&x, &stencils, &holds, Springs::default());
+        let pulls: Vec<Vec3> = holds.iter().zip(&z).map(|(m, z)| m * z).collect();
+        let relaxed = relaxation.relax(&pulls, &holds, &x, 1e-9);
         // By the crest in the middle, whose rim is far away.
         let middle = (0..x.len()).filter(|&v| {
             let p = x[v];
@@ -132,7 +215,7 @@ mod tests {
         });
         let (mut moved, mut asked) = (0.0, 0.0);
         for v in middle {
-            moved += (relaxed[v] - x[v]).x * wave(&x[v]);
+            moved += (relaxed[v] - x[v]).y * wave(&x[v]);
             asked += wave(&x[v]).powi(2);
         }
         moved / asked
@@ -141,7 +224,7 @@ mod tests {
     #[test]
     fn lengths_are_what_is_let_through_at_any_mesh_size() {
         let params = TransferParams {
-            place: 0.05,
+            spacing: 0.05,
             ..TransferParams::default()
         };
         for edge in [0.02, 0.01] {

@@ -95,7 +95,7 @@ fn neighbourhood(v: u32, rings: &[Vec<u32>]) -> Vec<u32> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::relax::rings;
+    use super::super::draped::rings;
     use super::*;
     use crate::geometry::Mat3;
     use crate::geometry::closest_point::tests::sphere;

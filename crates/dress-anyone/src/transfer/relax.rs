@@ -3,32 +3,23 @@
 //!
 //! A stencil is a vertex c and its neighbours, E = [x_i − x_c] in the source drape. The projector
 //! W = I − Eᵀ(EEᵀ)†E is blind to affine images of it. The relaxed X minimises
-//! ½ Σ w/n ‖W [x_i − x_c]‖² + ½ Σ_v (x_v − z_v)ᵀM_v(x_v − z_v) + ½ Σ k ‖x_v − Σ b_i x_i − o‖², the last over
+//! ½ Σ w/n ‖W [x_i − x_c]‖² + ½ Σ_v (x_v − z_v)ᵀM_v(x_v − z_v), and springs: ½ Σ k ‖x_v − Σ b_i x_i − o‖² over
 //! edges that keep their length in the direction that they have, and over layers that are tied to one
-//! another. M_v is stiffer along the body's
-//! normal than along the body, so the three coordinates are coupled; the scalar system with the mean of
-//! M_v, factored once, preconditions conjugate gradients for it.
+//! another; ½ Σ s (a·(x_i − x_j) − r)² over edges that keep their slope. M_v is stiffer along the body's
+//! normal than along the body, and slopes have one direction, so the three coordinates are coupled. The
+//! system with the usual holds, factored once, preconditions conjugate gradients for those of a round.
 
-use crate::geometry::Vec3;
-use faer::dyn_stack::{MemBuffer, MemStack};
-use faer::linalg::cholesky::llt::factor::LltRegularization;
-use faer::sparse::linalg::cholesky::{
-    CholeskySymbolicParams, LltRef, SymbolicCholesky, SymmetricOrdering,
-    factorize_symbolic_cholesky,
-};
-use faer::sparse::{SparseColMat, Triplet};
-use faer::{Conj, Mat, Par, Side, Spec};
-use std::collections::BTreeSet;
+use crate::geometry::sparse::{BlockMatrix, Factor, Structure};
+use crate::geometry::{Mat3, Vec3};
+use std::sync::Arc;
 
 /// The factored system of a source drape.
 pub(super) struct Relaxation {
-    symbolic: SymbolicCholesky<usize>,
-    factor: Vec<f64>,
-    /// Stencils and kept edges, lower triangle.
-    stiffness: SparseColMat<usize, f64>,
-    holds: Vec<Hold>,
-    kept: Vec<Kept>,
-    ties: Vec<Tie>,
+    /// Stencils and springs.
+    stiffness: BlockMatrix,
+    /// Of the same with the usual holds.
+    factor: Factor,
+    springs: Springs,
 }
 
 /// A vertex and those whose layout around it is kept.
@@ -37,20 +28,31 @@ pub(super) struct Stencil {
     pub(super) around: Vec<u32>,
 }
 
-/// How firmly a vertex is held, \[–\] beside the stencils; M_v = `along` I + (`across` − `along`) n nᵀ.
-#[derive(Clone, Copy)]
-pub(super) struct Hold {
-    /// Unit, or zero where nothing is special.
-    pub(super) normal: Vec3,
-    pub(super) across: f64,
-    pub(super) along: f64,
-}
+/// How firmly a vertex is held in each direction, M_v \[–\] beside the stencils; positive definite.
+pub(super) type Hold = Mat3;
 
 /// An edge that keeps its length \[m\].
 #[derive(Clone, Copy)]
 pub(super) struct Kept {
     pub(super) ends: [u32; 2],
     pub(super) length: f64,
+}
+
+/// An edge that keeps its rise \[m\] along a unit direction.
+pub(super) struct Slope {
+    pub(super) ends: [u32; 2],
+    pub(super) across: Vec3,
+    pub(super) rise: f64,
+    /// \[–\] beside the stencils.
+    pub(super) stiffness: f64,
+}
+
+/// What holds vertices to each other besides the stencils.
+#[derive(Default)]
+pub(super) struct Springs {
+    pub(super) kept: Vec<Kept>,
+    pub(super) ties: Vec<Tie>,
+    pub(super) slopes: Vec<Slope>,
 }
 
 /// A vertex that stays at an offset \[m\] from a point of a triangle.
@@ -63,6 +65,8 @@ pub(super) struct Tie {
 
 /// Directions of a stencil below this share of its widest one are rounding.
 const FLAT: f64 = 1e-7;
+/// Stiffness of regular stencils of edge length h against a displacement u, over |h² u″|² \[–\].
+pub(super) const FLEXIBILITY: f64 = 0.094;
 /// Stiffness of an edge that keeps its length \[–\]: far above what holds the vertices.
 const KEEP: f64 = 3.0;
 /// Stiffness of a tie \[–\]: firm beside what holds the vertices, soft beside the stencils.
@@ -70,72 +74,73 @@ const TIE: f64 = 0.3;
 /// Most iterations of a solve; some thirty suffice.
 const ITERATIONS: usize = 300;
 
-impl Hold {
-    /// M_v z.
-    pub(super) fn times(&self, z: Vec3) -> Vec3 {
-        z * self.along + self.normal * (self.normal.dot(&z) * (self.across - self.along))
+impl Kept {
+    /// The edge as long as it is in `x`.
+    pub(super) fn of(ends: [u32; 2], x: &[Vec3]) -> Self {
+        let [a, b] = ends.map(|v| x[v as usize]);
+        let length = (a - b).norm();
+        Self { ends, length }
     }
 }
 
 impl Relaxation {
-    /// Of the drape `x` with these stencils; every vertex is held.
-    pub(super) fn new(
-        x: &[Vec3],
-        stencils: &[Stencil],
-        holds: Vec<Hold>,
-        kept: &[[u32; 2]],
-        ties: Vec<Tie>,
-    ) -> Self {
-        let kept: Vec<Kept> = (kept.iter())
-            .map(|&ends| {
-                let [a, b] = ends.map(|v| x[v as usize]);
-                let length = (a - b).norm();
-                Kept { ends, length }
-            })
-            .collect();
-        let mean: Vec<f64> = holds.iter().map(|h| (h.across * h.along).sqrt()).collect();
-        let stiffness = system(x, stencils, (&kept, &ties), &vec![0.0; x.len()]);
-        let system = system(x, stencils, (&kept, &ties), &mean);
-        let symbolic = factorize_symbolic_cholesky(
-            system.symbolic(),
-            Side::Lower,
-            SymmetricOrdering::default(),
-            CholeskySymbolicParams::default(),
-        )
-        .expect("a garment's system fits in memory");
-        let mut factor = vec![0.0; symbolic.len_val()];
-        let scratch = symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, Spec::default());
-        symbolic
-            .factorize_numeric_llt(
-                &mut factor,
-                system.as_ref(),
-                Side::Lower,
-                LltRegularization::default(),
-                // One thread: its count must not change a bit of the result.
-                Par::Seq,
-                MemStack::new(&mut MemBuffer::new(scratch)),
-                Spec::default(),
-            )
-            .expect("projectors plus a positive diagonal are positive definite");
+    /// Of the drape `x` with these stencils and springs, usually held like this.
+    pub(super) fn new(x: &[Vec3], stencils: &[Stencil], usual: &[Hold], springs: Springs) -> Self {
+        let members = |s: &Stencil| [&[s.centre], &s.around[..]].concat();
+        let mut cliques: Vec<Vec<u32>> = stencils.iter().map(members).collect();
+        cliques.extend(springs.kept.iter().map(|kept| kept.ends.to_vec()));
+        cliques.extend(springs.slopes.iter().map(|slope| slope.ends.to_vec()));
+        cliques.extend(
+            springs
+                .ties
+                .iter()
+                .map(|tie| tie.ends().map(|(v, _)| v).to_vec()),
+        );
+        let structure = Structure::new(x.len(), cliques.iter().map(Vec::as_slice));
+        let mut system = System::new(structure);
+        for stencil in stencils {
+            system.add_stencil(x, stencil);
+        }
+        for kept in &springs.kept {
+            let [a, b] = kept.ends;
+            system.add(&[(a, 1.0), (b, -1.0)], &Mat3::from_diagonal_element(KEEP));
+        }
+        for tie in &springs.ties {
+            system.add(&tie.ends(), &Mat3::from_diagonal_element(TIE));
+        }
+        for slope in &springs.slopes {
+            let [a, b] = slope.ends;
+            let across = slope.across * slope.across.transpose();
+            system.add(&[(a, 1.0), (b, -1.0)], &(across * slope.stiffness));
+        }
+        let stiffness = system.matrix.clone();
+        for (v, hold) in usual.iter().enumerate() {
+            system.add(&[(v as u32, 1.0)], hold);
+        }
+        let factor = system.matrix.factor();
         Self {
-            symbolic,
-            factor,
             stiffness,
-            holds,
-            kept,
-            ties,
+            factor: factor.expect("projectors and positive holds are positive definite"),
+            springs,
         }
     }
 
-    /// The relaxed positions when every vertex v is pulled to `z[v]` \[m\], sought from `start` to
-    /// about `still` \[m\]; kept edges take their directions from `start`.
-    pub(super) fn relax(&self, z: &[Vec3], start: &[Vec3], still: f64) -> Vec<Vec3> {
+    /// The relaxed positions when every vertex v is held by M_v = `holds[v]` and pulled by M_v z_v = `pulls[v]`,
+    /// sought from `start` to about `still` \[m\]; kept edges take their directions from `start`.
+    pub(super) fn relax(
+        &self,
+        pulls: &[Vec3],
+        holds: &[Hold],
+        start: &[Vec3],
+        still: f64,
+    ) -> Vec<Vec3> {
         let mut x = start.to_vec();
-        let mut r = self.pulls(z, start);
-        for (r, ax) in r.iter_mut().zip(self.times(&x)) {
+        let mut r = pulls.to_vec();
+        self.add_springs(start, &mut r);
+        for (r, ax) in r.iter_mut().zip(self.times(holds, &x)) {
             *r -= ax;
         }
-        let mut q = self.precondition(&r);
+        let mut q = self.factor.solve(&r);
         let mut direction = q.clone();
         let mut slope = dot(&r, &q);
         for _ in 0..ITERATIONS {
@@ -143,13 +148,13 @@ impl Relaxation {
             if q.iter().all(|q| q.norm() <= still) {
                 break;
             }
-            let pushed = self.times(&direction);
+            let pushed = self.times(holds, &direction);
             let step = slope / dot(&direction, &pushed);
             for v in 0..x.len() {
                 x[v] += direction[v] * step;
                 r[v] -= pushed[v] * step;
             }
-            q = self.precondition(&r);
+            q = self.factor.solve(&r);
             let next = dot(&r, &q);
             let keep = next / slope;
             slope = next;
@@ -160,66 +165,44 @@ impl Relaxation {
         x
     }
 
-    /// M z, and what kept edges and ties ask for.
-    fn pulls(&self, z: &[Vec3], directions: &[Vec3]) -> Vec<Vec3> {
-        let mut pulls: Vec<Vec3> = (self.holds.iter().zip(z))
-            .map(|(hold, &z)| hold.times(z))
-            .collect();
-        for kept in &self.kept {
+    /// Adds what the springs ask for to `pulls`.
+    fn add_springs(&self, directions: &[Vec3], pulls: &mut [Vec3]) {
+        for kept in &self.springs.kept {
             let [a, b] = kept.ends.map(|v| v as usize);
             let edge = directions[a] - directions[b];
             let wanted = edge.try_normalize(0.0).unwrap_or_else(Vec3::zeros) * kept.length;
             pulls[a] += wanted * KEEP;
             pulls[b] -= wanted * KEEP;
         }
-        for tie in &self.ties {
+        for tie in &self.springs.ties {
             for (v, weight) in tie.ends() {
-                pulls[v] += tie.offset * (TIE * weight);
+                pulls[v as usize] += tie.offset * (TIE * weight);
             }
         }
-        pulls
+        for slope in &self.springs.slopes {
+            let [a, b] = slope.ends.map(|v| v as usize);
+            let force = slope.across * (slope.stiffness * slope.rise);
+            pulls[a] += force;
+            pulls[b] -= force;
+        }
     }
 
     /// The whole matrix times `x`.
-    fn times(&self, x: &[Vec3]) -> Vec<Vec3> {
-        let mut product: Vec<Vec3> = (self.holds.iter().zip(x))
-            .map(|(hold, &x)| hold.times(x))
-            .collect();
-        let (starts, rows) = (self.stiffness.col_ptr(), self.stiffness.row_idx());
-        let values = self.stiffness.val();
-        for column in 0..x.len() {
-            for at in starts[column]..starts[column + 1] {
-                let (row, value) = (rows[at], values[at]);
-                product[row] += x[column] * value;
-                if row != column {
-                    product[column] += x[row] * value;
-                }
-            }
+    fn times(&self, holds: &[Hold], x: &[Vec3]) -> Vec<Vec3> {
+        let mut product = self.stiffness.multiply(x);
+        for ((product, hold), x) in product.iter_mut().zip(holds).zip(x) {
+            *product += hold * x;
         }
         product
-    }
-
-    /// The factored matrix's inverse times `r`.
-    fn precondition(&self, r: &[Vec3]) -> Vec<Vec3> {
-        let mut q = Mat::from_fn(r.len(), 3, |v, axis| r[v][axis]);
-        let scratch = self.symbolic.solve_in_place_scratch::<f64>(3, Par::Seq);
-        LltRef::new(&self.symbolic, &self.factor).solve_in_place_with_conj(
-            Conj::No,
-            q.as_mut(),
-            Par::Seq,
-            MemStack::new(&mut MemBuffer::new(scratch)),
-        );
-        let row = |v| Vec3::new(q[(v, 0)], q[(v, 1)], q[(v, 2)]);
-        (0..r.len()).map(row).collect()
     }
 }
 
 impl Tie {
     /// Vertices and their weights in what is kept: 1, and minus those of the triangle.
-    fn ends(&self) -> [(usize, f64); 4] {
-        let [a, b, c] = self.triangle.map(|v| v as usize);
+    fn ends(&self) -> [(u32, f64); 4] {
+        let [a, b, c] = self.triangle;
         let [u, v, w] = self.weights.map(|weight| -weight);
-        [(self.vertex as usize, 1.0), (a, u), (b, v), (c, w)]
+        [(self.vertex, 1.0), (a, u), (b, v), (c, w)]
     }
 }
 
@@ -227,66 +210,53 @@ fn dot(a: &[Vec3], b: &[Vec3]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a.dot(b)).sum()
 }
 
-/// The neighbours of every vertex along the triangles' edges, ascending.
-pub(super) fn rings(vertex_count: usize, triangles: &[[u32; 3]]) -> Vec<Vec<u32>> {
-    let mut rings = vec![BTreeSet::new(); vertex_count];
-    for &[a, b, c] in triangles {
-        rings[a as usize].extend([b, c]);
-        rings[b as usize].extend([c, a]);
-        rings[c as usize].extend([a, b]);
-    }
-    let ascending = rings.into_iter().map(|ring| ring.into_iter().collect());
-    ascending.collect()
+/// A matrix in the making.
+struct System {
+    structure: Arc<Structure>,
+    matrix: BlockMatrix,
 }
 
-/// Lower triangle of Σ BᵀWB / n over the stencils, where (B X)_i = x_i − x_c, with kept edges and
-/// ties, and `diagonal`.
-fn system(
-    x: &[Vec3],
-    stencils: &[Stencil],
-    (kept, ties): (&[Kept], &[Tie]),
-    diagonal: &[f64],
-) -> SparseColMat<usize, f64> {
-    let mut entries = Vec::new();
-    let mut add = |row: usize, col: usize, val: f64| {
-        if row >= col {
-            entries.push(Triplet { row, col, val });
-        }
-    };
-    for (v, &m) in diagonal.iter().enumerate() {
-        add(v, v, m);
+impl System {
+    fn new(structure: Structure) -> Self {
+        let structure = Arc::new(structure);
+        let matrix = BlockMatrix::zeros(Arc::clone(&structure));
+        Self { structure, matrix }
     }
-    for kept in kept {
-        let [a, b] = kept.ends.map(|v| v as usize);
-        for (row, col, sign) in [(a, a, 1.0), (b, b, 1.0), (a, b, -1.0), (b, a, -1.0)] {
-            add(row, col, sign * KEEP);
-        }
-    }
-    for tie in ties {
-        for (row, first) in tie.ends() {
-            for (col, second) in tie.ends() {
-                add(row, col, TIE * first * second);
+
+    /// Adds w wᵀ ⊗ `stiffness`, where w has these weights at these vertices.
+    fn add(&mut self, weights: &[(u32, f64)], stiffness: &Mat3) {
+        for &(row, first) in weights {
+            for &(column, second) in weights.iter().filter(|(column, _)| *column <= row) {
+                let slot = self.structure.slot(row, column);
+                self.matrix.add(slot, &(stiffness * (first * second)));
             }
         }
     }
-    for stencil in stencils {
-        let (v, around) = (stencil.centre as usize, &stencil.around);
-        let edges: Vec<Vec3> = around.iter().map(|&i| x[i as usize] - x[v]).collect();
+
+    /// Adds BᵀWB / n, where (B X)_i = x_i − x_c.
+    fn add_stencil(&mut self, x: &[Vec3], stencil: &Stencil) {
+        let centre = stencil.centre;
+        let from = |i: &u32| x[*i as usize] - x[centre as usize];
+        let edges: Vec<Vec3> = stencil.around.iter().map(from).collect();
         let basis = affine_basis(&edges);
-        let share = 1.0 / around.len() as f64;
-        for (i, &row) in around.iter().enumerate() {
-            for (j, &col) in around.iter().enumerate() {
+        let share = 1.0 / edges.len() as f64;
+        let mut add = |row: u32, column: u32, value: f64| {
+            if row >= column {
+                let slot = self.structure.slot(row, column);
+                self.matrix.add_scalar(slot, value);
+            }
+        };
+        for (i, &row) in stencil.around.iter().enumerate() {
+            for (j, &column) in stencil.around.iter().enumerate() {
                 let seen: f64 = basis.iter().map(|q| q[i] * q[j]).sum();
                 let w = share * (f64::from(u8::from(i == j)) - seen);
-                add(row as usize, col as usize, w);
-                add(row as usize, v, -w);
-                add(v, col as usize, -w);
-                add(v, v, w);
+                add(row, column, w);
+                add(row, centre, -w);
+                add(centre, column, -w);
+                add(centre, centre, w);
             }
         }
     }
-    SparseColMat::try_new_from_triplets(x.len(), x.len(), &entries)
-        .expect("stencils index the vertices")
 }
 
 /// Orthonormal basis of what affine images of a ring look like along its edges, `[≤ 3][edge]`:
@@ -328,6 +298,7 @@ fn remove(basis: &[Vec<f64>], row: &mut [f64]) {
 
 #[cfg(test)]
 mod tests {
+    use super::super::draped::rings;
     use super::*;
     use crate::check::noise;
     use crate::geometry::Mat3;
@@ -341,6 +312,11 @@ mod tests {
         rings.into_iter().enumerate().map(stencil).collect()
     }
 
+    /// M z.
+    fn pulls(z: &[Vec3], holds: &[Hold]) -> Vec<Vec3> {
+        holds.iter().zip(z).map(|(m, z)| m * z).collect()
+    }
+
     fn bumpy() -> (Vec<Vec3>, Vec<Stencil>) {
         let mesh = sphere(0.3, 2);
         let bump = |(i, p): (usize, &Vec3)| p * (1.0 + 0.1 * noise(i));
@@ -350,10 +326,9 @@ mod tests {
 
     /// Held a hundred times as firmly along the normal as along the sphere.
     fn holds(x: &[Vec3]) -> Vec<Hold> {
-        let hold = |p: &Vec3| Hold {
-            normal: p.normalize(),
-            across: 0.1,
-            along: 1e-3,
+        let hold = |p: &Vec3| {
+            let n = p.normalize();
+            Hold::from_diagonal_element(1e-3) + n * n.transpose() * (0.1 - 1e-3)
         };
         x.iter().map(hold).collect()
     }
@@ -363,13 +338,13 @@ mod tests {
         let (x, stencils) = bumpy();
         let stretch = Mat3::from_fn(|i, j| noise(3 * i + j) + f64::from(u8::from(i == j)));
         let image: Vec<Vec3> = x.iter().map(|p| stretch * p + Vec3::repeat(0.7)).collect();
-        let relaxation = Relaxation::new(&x, &stencils, holds(&x), &[], vec![]);
-        let forces = relaxation.times(&image);
+        let relaxation = Relaxation::new(&x, &stencils, &holds(&x), Springs::default());
+        let forces = relaxation.times(&holds(&x), &image);
         // Nothing but the holds: positions of the order of 1 m.
-        for (force, (hold, image)) in forces.iter().zip(relaxation.holds.iter().zip(&image)) {
-            assert!((force - hold.times(*image)).norm() < 1e-12);
+        for (force, (hold, image)) in forces.iter().zip(holds(&x).iter().zip(&image)) {
+            assert!((force - hold * image).norm() < 1e-12);
         }
-        let relaxed = relaxation.relax(&image, &image, 1e-10);
+        let relaxed = relaxation.relax(&pulls(&image, &holds(&x)), &holds(&x), &image, 1e-10);
         let mut both = relaxed.iter().zip(&image);
         assert!(both.all(|(a, b)| (a - b).norm() < 1e-12));
     }
@@ -377,12 +352,13 @@ mod tests {
     #[test]
     fn the_relaxed_shape_solves_the_coupled_system() {
         let (x, stencils) = bumpy();
-        let relaxation = Relaxation::new(&x, &stencils, holds(&x), &[], vec![]);
+        let holds = holds(&x);
+        let relaxation = Relaxation::new(&x, &stencils, &holds, Springs::default());
         let z: Vec<Vec3> = (x.iter().enumerate())
             .map(|(i, p)| p + Vec3::from_fn(|c, _| 0.02 * noise(3 * i + c)))
             .collect();
-        let relaxed = relaxation.relax(&z, &x, 1e-12);
-        let (left, right) = (relaxation.times(&relaxed), relaxation.pulls(&z, &x));
+        let relaxed = relaxation.relax(&pulls(&z, &holds), &holds, &x, 1e-12);
+        let (left, right) = (relaxation.times(&holds, &relaxed), pulls(&z, &holds));
         // Forces are of the order of 0.1 · 0.3; a thousandth of that moves nothing by a micrometre.
         let mut both = left.iter().zip(&right);
         assert!(both.all(|(a, b)| (a - b).norm() < 1e-9));
@@ -393,7 +369,8 @@ mod tests {
         let (x, stencils) = bumpy();
         let mut z = x.clone();
         z[50] *= 1.3;
-        let relaxed = Relaxation::new(&x, &stencils, holds(&x), &[], vec![]).relax(&z, &z, 1e-10);
+        let relaxation = Relaxation::new(&x, &stencils, &holds(&x), Springs::default());
+        let relaxed = relaxation.relax(&pulls(&z, &holds(&x)), &holds(&x), &z, 1e-10);
         // Its own ring takes it for an affine image (on a sphere all neighbours lie equally deep);
         // those of its neighbours do not.
         assert!((relaxed[50] - x[50]).norm() < 0.6 * (z[50] - x[50]).norm());
@@ -405,8 +382,12 @@ mod tests {
         let edge = [stencils[50].centre, stencils[50].around[0]];
         let length = |x: &[Vec3]| (x[edge[0] as usize] - x[edge[1] as usize]).norm();
         let larger: Vec<Vec3> = x.iter().map(|p| p * 1.5).collect();
-        let relaxation = Relaxation::new(&x, &stencils, holds(&x), &[edge], vec![]);
-        let relaxed = relaxation.relax(&larger, &larger, 1e-10);
+        let springs = Springs {
+            kept: vec![Kept::of(edge, &x)],
+            ..Springs::default()
+        };
+        let relaxation = Relaxation::new(&x, &stencils, &holds(&x), springs);
+        let relaxed = relaxation.relax(&pulls(&larger, &holds(&x)), &holds(&x), &larger, 1e-10);
         // Holds of 0.1 against 3, and stencils that yield.
         assert!((length(&relaxed) / length(&x) - 1.0).abs() < 0.1);
     }
@@ -421,8 +402,9 @@ mod tests {
             Vec3::z(),
         ];
         let stencils = stencils(rings(5, &[[0, 1, 2], [1, 3, 2]]));
-        let relaxed = Relaxation::new(&x, &stencils, holds(&x[1..2].repeat(5)), &[], vec![]);
-        let relaxed = relaxed.relax(&x, &x, 1e-12);
+        let holds = holds(&x[1..2].repeat(5));
+        let relaxation = Relaxation::new(&x, &stencils, &holds, Springs::default());
+        let relaxed = relaxation.relax(&pulls(&x, &holds), &holds, &x, 1e-12);
         assert!(relaxed.iter().zip(&x).all(|(a, b)| (a - b).norm() < 1e-14));
     }
 }

@@ -1,0 +1,112 @@
+//! A garment on the source body, and what its target shape needs to know of it.
+
+use crate::body::Body;
+use crate::geometry::mesh::vertex_normals;
+use crate::geometry::{ClosestPoint, Vec3};
+use rayon::prelude::*;
+use std::collections::BTreeSet;
+use std::iter::Sum;
+use std::ops::Mul;
+
+/// A welded cloth where it lies on the source body.
+pub(super) struct Draped<'a> {
+    /// Positions \[m\].
+    pub(super) x: &'a [Vec3],
+    pub(super) triangles: &'a [[u32; 3]],
+    /// The neighbours of every vertex along the triangles' edges, ascending.
+    pub(super) rings: Vec<Vec<u32>>,
+    /// Usual length of the edges at each vertex \[m\].
+    pub(super) sizes: Vec<f64>,
+    /// Signed distances to the body \[m\].
+    pub(super) distance: Vec<f64>,
+    /// Unit directions in which the cloth faces, away from the body on the whole, freed from folds; zero where
+    /// it faces none.
+    pub(super) facing: Vec<Vec3>,
+    /// The body's \[m\]: lengths that mean the same on all bodies are shares of it.
+    pub(super) height: f64,
+}
+
+/// Length over which the directions that cloth faces are averaged, as share of the body's height: 8 cm on an
+/// adult, so that folds do not count.
+const FOLDS: f64 = 0.05;
+/// Most rounds of averaging.
+const ROUNDS: f64 = 150.0;
+
+impl<'a> Draped<'a> {
+    pub(super) fn new(
+        x: &'a [Vec3],
+        triangles: &'a [[u32; 3]],
+        (body, surface): (&Body, &ClosestPoint),
+    ) -> Self {
+        let (low, high) = body.mesh.bounds();
+        let rings = rings(x.len(), triangles);
+        let mut draped = Self {
+            x,
+            triangles,
+            sizes: sizes(x, &rings),
+            distance: (x.par_iter())
+                .map(|&x| surface.signed_distance(x))
+                .collect(),
+            facing: Vec::new(),
+            height: (high - low).max(),
+            rings,
+        };
+        let normals = draped.averaged(vertex_normals(x, triangles), FOLDS);
+        // The winding of a whole garment may be inside out.
+        let agreement: f64 = (x.iter().zip(&normals))
+            .filter_map(|(&x, n)| {
+                Some(
+                    surface
+                        .pseudonormal(&surface.query(x, f64::INFINITY)?)
+                        .dot(n),
+                )
+            })
+            .sum();
+        let unit = |n: &Vec3| n.try_normalize(1e-9).map(|n| n * agreement.signum());
+        draped.facing = (normals.iter())
+            .map(|n| unit(n).unwrap_or_else(Vec3::zeros))
+            .collect();
+        draped
+    }
+
+    /// Numbers at the vertices, averaged along the cloth over about this share of the body's height.
+    pub(super) fn averaged<T>(&self, mut values: Vec<T>, share: f64) -> Vec<T>
+    where
+        T: Copy + Sum + Mul<f64, Output = T>,
+    {
+        let size = self.sizes.iter().sum::<f64>() / self.sizes.len().max(1) as f64;
+        let rounds = (share * self.height / size).powi(2).clamp(1.0, ROUNDS) as usize;
+        for _ in 0..rounds {
+            let mean = |(ring, own): (&Vec<u32>, &T)| {
+                let around = ring.iter().map(|&i| values[i as usize]);
+                around.chain([*own]).sum::<T>() * (1.0 / (1 + ring.len()) as f64)
+            };
+            values = self.rings.iter().zip(&values).map(mean).collect();
+        }
+        values
+    }
+}
+
+/// The neighbours of every vertex along the triangles' edges, ascending.
+pub(super) fn rings(vertex_count: usize, triangles: &[[u32; 3]]) -> Vec<Vec<u32>> {
+    let mut rings = vec![BTreeSet::new(); vertex_count];
+    for &[a, b, c] in triangles {
+        rings[a as usize].extend([b, c]);
+        rings[b as usize].extend([c, a]);
+        rings[c as usize].extend([a, b]);
+    }
+    let ascending = rings.into_iter().map(|ring| ring.into_iter().collect());
+    ascending.collect()
+}
+
+/// Mean length of the edges around each vertex \[m\]; never far below the usual, for slivers and
+/// loose vertices must be held too.
+fn sizes(x: &[Vec3], rings: &[Vec<u32>]) -> Vec<f64> {
+    let size = |(v, ring): (usize, &Vec<u32>)| {
+        let sum: f64 = ring.iter().map(|&i| (x[i as usize] - x[v]).norm()).sum();
+        sum / ring.len().max(1) as f64
+    };
+    let sizes: Vec<f64> = rings.iter().enumerate().map(size).collect();
+    let mean = sizes.iter().sum::<f64>() / sizes.len().max(1) as f64;
+    sizes.iter().map(|size| size.max(0.5 * mean)).collect()
+}
