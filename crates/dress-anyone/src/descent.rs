@@ -43,17 +43,20 @@ pub struct DescentParams {
     /// Where derivatives of the drape come from: `equilibrium`, or the paper's `trajectory`, which
     /// goes with `lbfgs` and `descent`.
     pub gradient: Gradient,
-    /// Largest number of accepted steps. Each costs a drape; the paper's gradient descent takes
-    /// hundreds.
+    /// Largest number of accepted steps in free cloth. Each costs a drape; the paper's gradient descent
+    /// takes hundreds.
     pub iterations: usize,
     /// Largest number of drapes refused in a row before the search is called stalled.
     pub refusals: usize,
+    /// Most factorisations that the drape after a step may take: one that takes more is refused.
+    pub patience: usize,
     /// First damping μ \[–\].
     pub damping: f64,
     /// Farthest any pattern vertex moves in one step \[m\]: a drape's derivative is to be trusted
     /// for one or two percent of a panel.
     pub step: f64,
-    /// Converged when the loss falls by less than this part twice in a row \[–\].
+    /// Converged when a step of `lm`, or two of another in a row, lower the loss by less than this part,
+    /// or when by the gradient none lowers it by more \[–\].
     pub tolerance: f64,
     /// Converged when no pattern vertex moves farther than this in a step \[m\].
     pub least_step: f64,
@@ -66,6 +69,7 @@ impl Default for DescentParams {
             gradient: Gradient::default(),
             iterations: 40,
             refusals: 6,
+            patience: 100,
             damping: 1e-2,
             step: 0.03,
             tolerance: 2e-3,
@@ -125,6 +129,22 @@ impl Model {
     /// ‖∂L/∂p‖ of the loss L = RᵀR.
     pub fn gradient_norm(&self) -> f64 {
         2.0 * self.g.norm()
+    }
+
+    /// ½ ∂L/∂p of the loss L = RᵀR.
+    pub fn half_gradient(&self) -> &DVector<f64> {
+        &self.g
+    }
+
+    /// H⁻¹ `by`; of what nothing determines, a great deal.
+    pub fn undamped(&self, by: &DVector<f64>) -> DVector<f64> {
+        let mut h = self.h.clone();
+        let mean = h.diagonal().sum() / by.len() as f64;
+        for i in 0..by.len() {
+            h[(i, i)] += 1e-9 * mean;
+        }
+        let definite = h.cholesky();
+        definite.map_or(by * f64::INFINITY, |h| h.solve(by))
     }
 
     /// The step for damping `mu`; none if the model is not finite.

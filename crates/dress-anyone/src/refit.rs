@@ -11,8 +11,8 @@ pub mod gradient_check;
 mod levels;
 mod measure;
 mod prepare;
+pub mod recovery;
 mod search;
-mod stiffen;
 pub mod transfer;
 mod written;
 
@@ -24,7 +24,7 @@ use crate::geometry::{Vec2, Vec3};
 use crate::loss::{LossParams, LossTerms};
 use crate::pattern::Pattern;
 use crate::problem::Problem;
-use crate::report::{Report, StageTime, Status};
+use crate::report::{Ending, Report, StageTime};
 use crate::sim::drape::DrapeProgress;
 use crate::sim::equilibrium::RestStatus;
 use crate::sim::{Cloth, SimParams, Start, drape};
@@ -270,7 +270,7 @@ pub fn refit_from(
         losses: &prepared.losses,
     };
     let report = measured.report(
-        found.status,
+        found.ending,
         prepared.scale,
         prepared.cages.unknown_count(),
         found.iterations,
@@ -351,10 +351,9 @@ impl Clock {
 
 /// What a refit ended with before it was written.
 pub(crate) struct Found {
-    zeta: Vec<f64>,
     x_bar: Vec<Vec2>,
     x: Vec<Vec3>,
     initial: Vec<Vec3>,
-    status: Status,
+    ending: Ending,
     iterations: Vec<crate::report::Iteration>,
 }

@@ -14,10 +14,40 @@ pub enum Status {
     Converged,
     /// The largest number of steps was taken.
     IterationLimit,
-    /// No step lowers the loss, though the last one still did by more than the tolerance.
+    /// No step that was tried lowers the loss, though its gradient promises it.
     Stalled,
     /// Interrupted: the best so far.
     Stopped,
+}
+
+/// Why a search took no further step.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Ending {
+    /// The loss fell by less than `descent.tolerance`.
+    SmallChange,
+    /// No pattern vertex moved farther than `descent.least_step`.
+    ShortStep,
+    /// By its gradient, no step lowers the loss by more than `descent.tolerance`.
+    Flat,
+    /// The gradient promises more, but no step that was tried lowered the loss.
+    NoBetterStep,
+    /// `descent.iterations` were taken.
+    IterationLimit,
+    /// Somebody asked to stop.
+    Interrupted,
+}
+
+impl Ending {
+    /// What that says of the result.
+    pub fn status(self) -> Status {
+        match self {
+            Self::SmallChange | Self::ShortStep | Self::Flat => Status::Converged,
+            Self::NoBetterStep => Status::Stalled,
+            Self::IterationLimit => Status::IterationLimit,
+            Self::Interrupted => Status::Stopped,
+        }
+    }
 }
 
 /// One accepted step, or the start.
@@ -25,6 +55,9 @@ pub enum Status {
 pub struct Iteration {
     /// 0 is the initial guess.
     pub iteration: usize,
+    /// Rate of the springs that draw the cloth to x\* \[1/s²\]; 0 in free cloth. Losses of different
+    /// rates are of different drapes.
+    pub guide: f64,
     /// Weighted sum of the terms.
     pub loss: f64,
     /// The paper's shape-matching part of it.
@@ -138,6 +171,8 @@ pub struct Report {
     pub version: &'static str,
     /// How it ended.
     pub status: Status,
+    /// Why no further step was taken.
+    pub ending: Ending,
     /// Names of garment, source body and target body.
     pub names: [String; 3],
     /// Cloth vertices and triangles.

@@ -35,6 +35,8 @@ pub enum Command {
     Refit(RefitArguments),
     /// Compare the gradient of a refit's loss with differences of complete drapes.
     CheckGradient(CheckGradientArguments),
+    /// Change a pattern at random, and search for the change from its drape on another body alone.
+    CheckRecovery(CheckRecoveryArguments),
     /// Carry a garment's drape to another body: the shape that a refit aims for, without a pattern.
     Transfer(TransferArguments),
     /// Drape a garment on a body.
@@ -103,6 +105,20 @@ pub struct CheckGradientArguments {
     /// Random directions along which to compare
     #[arg(long, value_name = "N", default_value = "3")]
     pub directions: NonZeroUsize,
+}
+
+/// `dress check-recovery`.
+#[derive(Debug, Args)]
+pub struct CheckRecoveryArguments {
+    /// Garment, bodies, and how.
+    #[command(flatten)]
+    pub fitting: FittingArguments,
+    /// How much panels are stretched, sheared and bent at most, as a part of their size
+    #[arg(long, value_name = "PART", value_parser = positive, default_value = "0.15")]
+    pub change: f64,
+    /// Which random change
+    #[arg(long, value_name = "N", default_value = "1")]
+    pub seed: usize,
 }
 
 /// `dress drape`.

@@ -11,6 +11,7 @@
 mod arguments;
 mod body;
 mod check_gradient;
+mod check_recovery;
 mod checkpoint;
 mod correspond;
 mod drape;
@@ -65,6 +66,10 @@ fn run(command: &Command) -> Result<String, Failure> {
         Command::CheckGradient(arguments) => {
             set_threads(&arguments.fitting.pair.running)?;
             check_gradient::run(arguments)
+        }
+        Command::CheckRecovery(arguments) => {
+            set_threads(&arguments.fitting.pair.running)?;
+            check_recovery::run(arguments)
         }
         Command::Transfer(arguments) => {
             set_threads(&arguments.pair.running)?;

@@ -1,6 +1,6 @@
 //! A refit in a few lines that a designer understands.
 
-use dress_anyone::report::{DrapeReport, PanelReport, Report, SeamReport, Status};
+use dress_anyone::report::{DrapeReport, Ending, PanelReport, Report, SeamReport};
 use dress_anyone::sim::equilibrium::RestStatus;
 use std::fmt::Write;
 use std::path::Path;
@@ -11,7 +11,7 @@ pub fn of(report: &Report, out: &Path) -> String {
     let seconds: f64 = report.stages.iter().map(|stage| stage.seconds).sum();
     let mut lines = format!(
         "{garment}: refitted from {source} to {target} in {seconds:.0} s; {}\n",
-        ending(report.status)
+        ending(report.ending)
     );
     let mut line = |text: String| lines.push_str(&(text + "\n"));
     if let (Some(first), Some(last)) = (report.iterations.first(), report.iterations.last()) {
@@ -42,13 +42,15 @@ pub fn of(report: &Report, out: &Path) -> String {
     lines
 }
 
-/// How a refit ended, in words.
-fn ending(status: Status) -> &'static str {
-    match status {
-        Status::Converged => "converged",
-        Status::IterationLimit => "not finished: the largest number of steps was taken",
-        Status::Stalled => "stalled: no further step was better, though the last one was",
-        Status::Stopped => "stopped early: this is the best so far",
+/// How a search ended, in words.
+pub fn ending(ending: Ending) -> &'static str {
+    match ending {
+        Ending::SmallChange => "converged: the loss hardly fell any more",
+        Ending::ShortStep => "converged: the pattern hardly changed any more",
+        Ending::Flat => "converged: the loss is level",
+        Ending::NoBetterStep => "stalled: no further step was better, though the slope promised it",
+        Ending::IterationLimit => "not finished: the largest number of steps was taken",
+        Ending::Interrupted => "stopped early: this is the best so far",
     }
 }
 

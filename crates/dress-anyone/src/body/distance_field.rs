@@ -11,6 +11,7 @@
 
 mod crevices;
 mod nodes;
+mod pull_back;
 
 use crate::geometry::watertight::watertight;
 use crate::geometry::{ClosestPoint, Mat3, TriangleMesh, Vec3};
@@ -21,7 +22,9 @@ use rayon::prelude::*;
 #[derive(Clone, Debug, PartialEq)]
 pub struct DistanceField {
     grid: Grid,
-    /// Distances at the nodes \[m\], brick by brick, x fastest.
+    /// Farther outside \[m\] distances are not searched.
+    reach: f64,
+    /// Coefficients at the nodes \[m\], brick by brick, x fastest.
     values: Vec<f64>,
 }
 
@@ -48,7 +51,11 @@ impl DistanceField {
         let reach = outer + 2.0 * 3.0_f64.sqrt() * spacing;
         let grid = Grid::around(body, &closest, spacing, reach);
         let values = nodes::distances(&grid, &closest, reach);
-        let mut field = Self { grid, values };
+        let mut field = Self {
+            grid,
+            reach,
+            values,
+        };
         field.sink_what_no_air_reaches();
         field.fill_crevices();
         field.sharpen();
@@ -131,16 +138,7 @@ impl DistanceField {
 
     /// The coefficients around `p`, and where `p` lies between the second and third along x, y and z.
     fn stencil(&self, p: Vec3) -> Option<(Coefficients, [f64; 3])> {
-        let u = (p - self.grid.origin) / self.grid.spacing;
-        let mut first = [0; 3];
-        for axis in 0..3 {
-            let node_count = self.grid.node_count(axis);
-            // Written so that a coordinate that is no number fails too.
-            if !(u[axis] >= 1.0 && u[axis] < (node_count - 2) as f64) {
-                return None;
-            }
-            first[axis] = u[axis] as usize - 1;
-        }
+        let (first, t) = self.place_of(p)?;
         // Along each axis the four nodes lie in one brick or in two neighbours.
         let mut starts = [0; 8];
         for (corner, start) in starts.iter_mut().enumerate() {
@@ -164,7 +162,23 @@ impl DistanceField {
                 }
             }
         }
-        Some((coefficients, [u.x.fract(), u.y.fract(), u.z.fract()]))
+        Some((coefficients, t))
+    }
+
+    /// The first of the four nodes around `p` along each axis, and where `p` lies between the second and
+    /// the third.
+    fn place_of(&self, p: Vec3) -> Option<([usize; 3], [f64; 3])> {
+        let u = (p - self.grid.origin) / self.grid.spacing;
+        let mut first = [0; 3];
+        for axis in 0..3 {
+            let node_count = self.grid.node_count(axis);
+            // Written so that a coordinate that is no number fails too.
+            if !(u[axis] >= 1.0 && u[axis] < (node_count - 2) as f64) {
+                return None;
+            }
+            first[axis] = u[axis] as usize - 1;
+        }
+        Some((first, [u.x.fract(), u.y.fract(), u.z.fract()]))
     }
 
     /// Makes negative what is not joined to the absent bricks through positive nodes.
@@ -202,25 +216,36 @@ impl DistanceField {
     /// Turns distances into coefficients of a spline that has them, nearly: the spline of c is
     /// c + h²/6 ∇²c + O(h⁴).
     fn sharpen(&mut self) {
-        let most = SHARPEST * self.grid.spacing;
         let bricks: Vec<Vec<f64>> = (self.grid.stored.par_iter().enumerate())
             .map(|(ordinal, &brick)| {
                 let values = &self.values[ordinal * BRICK..(ordinal + 1) * BRICK];
                 let sharp = |(node, d): ([usize; 3], &f64)| {
-                    // Farther off some nodes hold means of others, with kinks of their own.
-                    if d.abs() > nodes::SEARCHED - self.grid.spacing {
-                        return *d;
-                    }
-                    let mut bend = 0.0;
-                    for (_, place) in self.neighbours(node) {
-                        bend += place.map_or(0.0, |place| self.values[place] - d);
-                    }
-                    d - (bend / 6.0).clamp(-most, most)
+                    let value = |_, place: usize| self.values[place];
+                    let bend = self.bend(node, *d, value);
+                    d - bend.clamp(-self.sharpest(), self.sharpest())
                 };
                 self.grid.nodes(brick).zip(values).map(sharp).collect()
             })
             .collect();
         self.values = bricks.concat();
+    }
+
+    /// h²/6 ∇²d at a node of distance `d`, given the distance of each neighbour by its place.
+    fn bend(&self, node: [usize; 3], d: f64, of: impl Fn([usize; 3], usize) -> f64) -> f64 {
+        // Farther off some nodes hold means of others, with kinks of their own.
+        if d.abs() > nodes::SEARCHED - self.grid.spacing {
+            return 0.0;
+        }
+        let mut bend = 0.0;
+        for (neighbour, place) in self.neighbours(node) {
+            bend += place.map_or(0.0, |place| of(neighbour, place) - d);
+        }
+        bend / 6.0
+    }
+
+    /// Most by which a coefficient differs from the distance \[m\].
+    fn sharpest(&self) -> f64 {
+        SHARPEST * self.grid.spacing
     }
 
     /// The six nodes around `node` and the places of their values; none in absent bricks.

@@ -21,6 +21,8 @@ pub struct Checkpoint {
     pub(super) x_star: Vec<Vec3>,
     /// The drape of the initial guess \[m\].
     pub(super) initial: Vec<Vec3>,
+    /// The level of the search that it is of, with the mesh of that level.
+    pub(super) level: usize,
     /// The best pattern's unknowns \[m\], its drape \[m\], and the gradient there \[1/m\].
     pub(super) zeta: Vec<f64>,
     pub(super) x: Vec<Vec3>,
@@ -34,7 +36,8 @@ pub struct Checkpoint {
     pub(super) steps: Steps,
     /// Steps in a row that hardly lowered the loss.
     pub(super) slow: usize,
-    pub(super) fresh_starts: usize,
+    /// Steps taken in this level.
+    pub(super) taken: usize,
     /// Farthest move of the last step \[m\]; none where it says nothing.
     pub(super) moved: Option<f64>,
     pub(super) notes: Vec<Iteration>,
@@ -50,15 +53,22 @@ impl Checkpoint {
         self.notes.len().saturating_sub(1)
     }
 
-    /// Whether it is of this refit: same parameters, same target shape to the last bit, and
-    /// everything of the size it should have.
-    pub(super) fn is_of(&self, params: &RefitParams, x_star: &[Vec3], unknowns: usize) -> bool {
-        let count = x_star.len();
+    /// Whether it is of this refit, which has so many levels: same parameters, same target shape to the
+    /// last bit. Whether it fits its level is for the search there to see.
+    pub(super) fn is_of(&self, params: &RefitParams, x_star: &[Vec3], levels: usize) -> bool {
         self.params == *params
             && self.x_star == x_star
-            && [self.initial.len(), self.x.len()] == [count; 2]
-            && [self.zeta.len(), self.gradient.len()] == [unknowns; 2]
-            && self.steps.is_of(unknowns)
+            && self.initial.len() == x_star.len()
+            && self.level < levels
             && !self.notes.is_empty()
     }
+}
+
+/// What a checkpoint holds besides the search of its level.
+#[derive(Clone, Copy)]
+pub(super) struct Keep<'a> {
+    pub(super) params: &'a RefitParams,
+    pub(super) x_star: &'a [Vec3],
+    pub(super) initial: &'a [Vec3],
+    pub(super) level: usize,
 }

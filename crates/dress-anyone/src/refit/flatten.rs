@@ -31,32 +31,43 @@ const DAMPING: f64 = 1e-4;
 /// Unknowns, starting from the initial guess, whose rest shape makes x* as stretched as the source
 /// drape is over the reference.
 pub(super) fn flatten(prepared: &Prepared<'_>) -> Vec<f64> {
+    let mesh = &prepared.garment.mesh;
+    let wanted: Vec<Wanted> = (0..mesh.triangles.len())
+        .filter_map(|t| Wanted::new(mesh, t, &prepared.source_drape, &prepared.x_star))
+        .collect();
+    let area: f64 = wanted.iter().map(|w| w.rest.area).sum();
+    fitted(prepared, prepared.initial(), ROOM, |x_bar| {
+        let rows = |w: &Wanted| w.rows(x_bar, (STRAIN * w.rest.area / area).sqrt());
+        wanted.iter().flat_map(rows).collect()
+    })
+}
+
+/// The unknowns nearest to what `wanted`, residuals of the rest shape alone, asks for, with the terms of
+/// the loss that ask for a good pattern, and `evenness` times as much evenness of the cages.
+pub(super) fn fitted(
+    prepared: &Prepared<'_>,
+    mut zeta: Vec<f64>,
+    evenness: f64,
+    wanted: impl Fn(&[Vec2]) -> Vec<Row>,
+) -> Vec<f64> {
     let Prepared {
         cages,
         motions,
         losses,
         x_star,
-        source_drape: drape,
         ..
     } = prepared;
     let mesh = &prepared.garment.mesh;
-    let mut zeta = prepared.initial();
-    let wanted: Vec<Wanted> = (0..mesh.triangles.len())
-        .filter_map(|t| Wanted::new(mesh, t, drape, x_star))
-        .collect();
     let floor = quality_floor(mesh, LEAST_QUALITY);
-    let area: f64 = wanted.iter().map(|w| w.rest.area).sum();
     for _ in 0..ROUNDS {
         let x_bar = cages.deform(&zeta);
         // At x* itself only the terms of the pattern remain.
         let of_pattern = |row: &Row| row.x.is_empty();
         let mut rows: Vec<Row> = losses.rows(x_star, &x_bar);
         rows.retain(of_pattern);
-        for wanted in &wanted {
-            rows.extend(wanted.rows(&x_bar, (STRAIN * wanted.rest.area / area).sqrt()));
-        }
+        rows.extend(wanted(&x_bar));
         let weights = losses.weights();
-        let priors = cages.priors(&zeta, weights.affine, ROOM * weights.cage);
+        let priors = cages.priors(&zeta, weights.affine, evenness * weights.cage);
         let model = Model::new(rows.len() + priors.len(), motions.len(), |i, by| {
             let Some(row) = rows.get(i) else {
                 return priors[i - rows.len()].fill(by);

@@ -68,7 +68,7 @@ pub fn check_gradient(
     let scene = prepared.scene();
     let search = prepared.search(&scene);
     let zeta = prepared.initial();
-    let mut run = Run::new(&clock, observe);
+    let mut run = Run::new(&mut clock, observe);
     let failed = |failed: super::search::point::Failed| failed.on(&target.name);
     let here = search
         .candidate(zeta.clone(), prepared.x_star.clone(), &mut run)
@@ -131,7 +131,7 @@ fn trust(directions: &[Direction]) -> Option<f64> {
 }
 
 /// A number in (−1, 1) without pattern, the same in every run.
-fn unstructured(direction: usize, unknown: usize) -> f64 {
+pub(super) fn unstructured(direction: usize, unknown: usize) -> f64 {
     let seed = (1 + unknown + 7919 * direction) as f64;
     2.0 * (seed.sin() * 43_758.545_3).rem_euclid(1.0) - 1.0
 }

@@ -11,8 +11,8 @@ use crate::loss::Losses;
 use crate::pattern::symmetry::Symmetry;
 use crate::pattern::{EdgeId, Pattern, PatternMesh};
 use crate::report::{
-    DrapeReport, Iteration, MirrorReport, PanelReport, PatternQuality, Report, SeamReport,
-    StageTime, Status,
+    DrapeReport, Ending, Iteration, MirrorReport, PanelReport, PatternQuality, Report, SeamReport,
+    StageTime,
 };
 use crate::sim::energy::membrane::RestTriangle;
 use crate::sim::equilibrium::RestStatus;
@@ -34,7 +34,7 @@ pub(super) struct Measured<'a> {
 impl Measured<'_> {
     pub(super) fn report(
         &self,
-        status: Status,
+        ending: Ending,
         initial_scale: f64,
         unknowns: usize,
         iterations: Vec<Iteration>,
@@ -44,7 +44,8 @@ impl Measured<'_> {
         let name = |body: &Body| body.name.clone();
         Report {
             version: env!("CARGO_PKG_VERSION"),
-            status,
+            status: ending.status(),
+            ending,
             names: [
                 self.garment.name.clone(),
                 name(self.source),

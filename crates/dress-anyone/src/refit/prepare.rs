@@ -1,7 +1,6 @@
 //! What a search works on: the target shape (paper §4.2), cages (§4.3) with their symmetry (§4.5), the
 //! initial scale (§4.6), the body to drape on and the loss (§4.4).
 
-use super::checkpoint::Checkpoint;
 use super::dress::holds;
 use super::search::{self, Search};
 use super::{Clock, Observer, RefitError, RefitParams, drape_to_rest};
@@ -24,12 +23,14 @@ const WORTH_COARSENING: usize = 2;
 /// Everything that follows from garment, bodies and parameters, and that no search changes.
 pub(super) struct Prepared<'a> {
     pub(super) garment: &'a Garment,
-    target: &'a Body,
+    pub(super) target: &'a Body,
     pub(super) params: &'a RefitParams,
     /// The garment on the source body \[m\].
     pub(super) source_drape: Vec<Vec3>,
     /// The shape to aim for \[m\].
     pub(super) x_star: Vec<Vec3>,
+    /// What is held is held at its height here \[m\].
+    held: Vec<Vec3>,
     pub(super) symmetry: Option<Symmetry>,
     pub(super) cages: Cages,
     /// Scale of the initial guess \[–\].
@@ -76,7 +77,7 @@ impl<'a> Prepared<'a> {
             .then(|| Symmetry::detect(&garment.pattern, mesh, garment.drape.as_deref()));
         Self::aiming(
             garment,
-            [source_drape, x_star],
+            [source_drape, x_star.clone(), x_star],
             symmetry,
             (target, Arc::new(surface)),
             params,
@@ -86,7 +87,7 @@ impl<'a> Prepared<'a> {
     /// A search that aims at the second of the drapes, where the first is what the garment was.
     fn aiming(
         garment: &'a Garment,
-        [source_drape, x_star]: [Vec<Vec3>; 2],
+        [source_drape, x_star, held]: [Vec<Vec3>; 3],
         symmetry: Option<Symmetry>,
         (target, surface): (&'a Body, Arc<DistanceField>),
         params: &'a RefitParams,
@@ -96,7 +97,7 @@ impl<'a> Prepared<'a> {
         let cages = Cages::enclose(&garment.pattern, mesh, symmetry.as_ref(), &params.cage)
             .map_err(RefitError::Garment)?;
         let mut cloth = params.cloth(garment);
-        cloth.holds = holds(garment, &x_star, &params.hold);
+        cloth.holds = holds(garment, &held, &params.hold);
         Ok(Self {
             garment,
             target,
@@ -107,11 +108,19 @@ impl<'a> Prepared<'a> {
             motions: search::newton::motions(&cages, mesh),
             source_drape,
             x_star,
+            held,
             symmetry,
             cages,
             cloth,
             surface,
         })
+    }
+
+    /// The same search aiming at `x_star` instead, with the same held.
+    pub(super) fn aimed_at(self, x_star: Vec<Vec3>) -> Result<Self, RefitError> {
+        let drapes = [self.source_drape, x_star, self.held];
+        let body = (self.target, self.surface);
+        Self::aiming(self.garment, drapes, self.symmetry, body, self.params)
     }
 
     /// The garment in a mesh of about [`RefitParams::coarse`] vertices; none if it has few more than
@@ -131,7 +140,8 @@ impl<'a> Prepared<'a> {
         coarse: &'b Garment,
     ) -> Result<Prepared<'b>, RefitError> {
         let fine = &self.garment.mesh;
-        let drapes = [&self.source_drape, &self.x_star].map(|x| resample(fine, x, &coarse.mesh));
+        let drapes =
+            [&self.source_drape, &self.x_star, &self.held].map(|x| resample(fine, x, &coarse.mesh));
         let body = (self.target, Arc::clone(&self.surface));
         Prepared::aiming(coarse, drapes, self.symmetry.clone(), body, self.params)
     }
@@ -156,22 +166,12 @@ impl<'a> Prepared<'a> {
             cages: &self.cages,
             losses: &self.losses,
             scene,
-            x_star: &self.x_star,
             params: &self.params.descent,
             body: &self.target.name,
             motions: &self.motions,
-            // Time steps end elsewhere from every start: starts are not to be compared.
-            fresh_starts: match self.params.descent.gradient {
-                Gradient::Equilibrium => search::FRESH_STARTS,
-                Gradient::Trajectory => 0,
-            },
-            keep: Some(self.params),
+            guide: 0.0,
+            keep: None,
         }
-    }
-
-    /// Whether a checkpoint is of this search.
-    pub(super) fn noted(&self, checkpoint: &Checkpoint) -> bool {
-        checkpoint.is_of(self.params, &self.x_star, self.cages.unknown_count())
     }
 
     /// The unknowns of the scaled reference.

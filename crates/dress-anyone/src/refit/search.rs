@@ -8,22 +8,23 @@ mod downhill;
 pub(super) mod guards;
 pub(super) mod newton;
 pub(super) mod point;
+mod run;
 
-use super::checkpoint::Checkpoint;
-use super::{Clock, Found, Observer, Progress, RefitError, RefitParams};
+use super::RefitError;
+use super::checkpoint::{Checkpoint, Keep};
 use crate::cage::{Cages, Prior};
 use crate::descent::slope::Slope;
 use crate::descent::{Damping, DescentParams, Optimizer};
 use crate::geometry::{Vec2, Vec3};
 use crate::loss::Losses;
 use crate::pattern::PatternMesh;
-use crate::report::{Iteration, Status};
+use crate::report::Ending;
 use crate::sim::Scene;
 use crate::sim::energy::contact::Surface;
-use crate::sim::equilibrium::RestStatus;
 use guards::{farthest, quality_floor};
 use nalgebra::DVector;
-use point::Point;
+use point::{Failed, Point};
+pub(super) use run::Run;
 use serde::{Deserialize, Serialize};
 
 /// Predicted moves of the cloth beyond this are not trusted as a start \[m\].
@@ -32,8 +33,6 @@ const FARTHEST_PREDICTION: f64 = 0.03;
 const LEAST_QUALITY: f64 = 0.82;
 /// A refused step is tried again only while it moves the pattern farther than this \[m\].
 const SHORTEST_TRIAL: f64 = 1e-5;
-/// How often a settled search drapes its pattern again from the target shape.
-pub(super) const FRESH_STARTS: usize = 4;
 
 /// Everything the search needs and does not change.
 pub(super) struct Search<'a, S> {
@@ -45,25 +44,11 @@ pub(super) struct Search<'a, S> {
     pub(super) motions: &'a [Vec<Vec2>],
     pub(super) losses: &'a Losses,
     pub(super) scene: &'a Scene<'a, S>,
-    pub(super) x_star: &'a [Vec3],
     pub(super) params: &'a DescentParams,
-    /// How often a settled pattern is draped again from the target shape.
-    pub(super) fresh_starts: usize,
-    /// Parameters to note in checkpoints; none to make none.
-    pub(super) keep: Option<&'a RefitParams>,
-}
-
-/// What changes from step to step.
-struct Going<'s> {
-    best: Box<Point<'s>>,
-    /// The drape of the initial guess.
-    initial: Vec<Vec3>,
-    steps: Steps,
-    /// Steps in a row that hardly lowered the loss.
-    slow: usize,
-    fresh_starts: usize,
-    /// Farthest move of the last step \[m\]; none where it says nothing.
-    moved: Option<f64>,
+    /// Rate of the guides in this scene's cloth \[1/s²\], for the record.
+    pub(super) guide: f64,
+    /// What to note in checkpoints besides the search; none to make none.
+    pub(super) keep: Option<Keep<'a>>,
 }
 
 /// A pattern to begin from, and where its drape starts.
@@ -74,14 +59,25 @@ pub(super) struct Guess {
     pub(super) x: Vec<Vec3>,
 }
 
-/// What changes while searching.
-pub(super) struct Run<'a, 'b> {
-    notes: Vec<Iteration>,
-    drapes: usize,
-    factorisations: usize,
-    clock: &'a Clock,
-    observe: &'a mut Observer<'b>,
-    go_on: bool,
+/// Where a search ended.
+#[derive(Clone, Debug)]
+pub(super) struct Settled {
+    pub(super) zeta: Vec<f64>,
+    /// \[m\].
+    pub(super) x: Vec<Vec3>,
+    pub(super) ending: Ending,
+}
+
+/// What changes from step to step.
+struct Going<'s> {
+    best: Box<Point<'s>>,
+    steps: Steps,
+    /// Steps taken.
+    taken: usize,
+    /// Steps in a row that hardly lowered the loss.
+    slow: usize,
+    /// Farthest move of the last step \[m\]; none where it says nothing.
+    moved: Option<f64>,
 }
 
 /// What makes the steps, and what it has learned.
@@ -89,6 +85,13 @@ pub(super) struct Run<'a, 'b> {
 pub(super) enum Steps {
     Newton(Damping),
     Downhill(Slope),
+}
+
+/// How a step ended.
+enum Stepped<'a> {
+    Better(Box<Point<'a>>),
+    NoBetter,
+    Interrupted,
 }
 
 impl Steps {
@@ -100,8 +103,17 @@ impl Steps {
         }
     }
 
+    /// How many steps in a row must hardly lower the loss before it will not fall any further: those by
+    /// the gradient alone zigzag.
+    fn slow_steps(&self) -> usize {
+        match self {
+            Self::Newton(_) => 1,
+            Self::Downhill(_) => 2,
+        }
+    }
+
     /// Whether what it learned has so many unknowns.
-    pub(super) fn is_of(&self, unknowns: usize) -> bool {
+    fn is_of(&self, unknowns: usize) -> bool {
         match self {
             Self::Newton(_) => true,
             Self::Downhill(slope) => slope.is_of(unknowns),
@@ -109,175 +121,122 @@ impl Steps {
     }
 }
 
-impl<'a, 'b> Run<'a, 'b> {
-    /// Nothing done yet.
-    pub(super) fn new(clock: &'a Clock, observe: &'a mut Observer<'b>) -> Self {
-        Self {
-            notes: Vec::new(),
-            drapes: 0,
-            factorisations: 0,
-            clock,
-            observe,
-            go_on: true,
-        }
-    }
-}
-
 impl<'s, S: Surface> Search<'s, S> {
-    /// Searches from the best of several guesses, the initial one first, draped from the target
-    /// shape.
+    /// Searches from the best of several guesses; why the last failed if none of them comes to rest.
     pub(super) fn run(
         &self,
-        initial: Vec<f64>,
-        others: Vec<Guess>,
-        clock: &Clock,
-        observe: &mut Observer<'_>,
-    ) -> Result<Found, RefitError> {
-        let mut run = Run::new(clock, observe);
-        let mut best = self.first(initial, &mut run)?;
-        let initial = best.x.clone();
-        self.note(&best, 0.0, &mut run);
-        let mut moved = None;
-        for guess in others {
-            if !run.go_on {
-                break;
-            }
-            let tried = self.candidate(guess.zeta, guess.x, &mut run);
-            if let Some(better) = tried.ok().filter(|tried| tried.total < best.total) {
-                let better = self.accept(better);
-                let far = farthest(&better.x_bar, &best.x_bar);
-                // The same pattern from another start says nothing of how far there is to go.
-                moved = Some(far).filter(|far| *far > 0.0);
-                best = better;
-                self.note(&best, far, &mut run);
+        guesses: Vec<Guess>,
+        run: &mut Run<'_, '_>,
+    ) -> Result<Settled, Failed> {
+        let mut best: Option<Box<Point<'s>>> = None;
+        let mut failed = Failed::NEVER_TRIED;
+        for guess in guesses {
+            match self.candidate(guess.zeta, guess.x, run) {
+                Ok(tried) if best.as_ref().is_none_or(|best| tried.total < best.total) => {
+                    let next = self.accept(tried);
+                    let far = best.map_or(0.0, |best| farthest(&next.x_bar, &best.x_bar));
+                    run.note(self, &next, far);
+                    best = Some(next);
+                }
+                Ok(_) => {}
+                Err(why) => failed = why,
             }
         }
         let going = Going {
-            best,
-            initial,
+            best: best.ok_or(failed)?,
             steps: Steps::new(self.params),
+            taken: 0,
             slow: 0,
-            fresh_starts: 0,
-            moved,
+            moved: None,
         };
         Ok(self.go_on(going, run))
     }
 
-    /// Goes on from a checkpoint; none if the drape it left cannot be factored any more.
-    pub(super) fn resume(
-        &self,
-        from: Checkpoint,
-        clock: &Clock,
-        observe: &mut Observer<'_>,
-    ) -> Option<Found> {
-        let mut run = Run::new(clock, observe);
-        run.drapes = from.drapes;
-        run.factorisations = from.factorisations;
-        run.notes.clone_from(&from.notes);
+    /// Goes on from a checkpoint; none if it does not fit, or the drape it left cannot be factored any
+    /// more.
+    pub(super) fn resume(&self, from: Checkpoint, run: &mut Run<'_, '_>) -> Option<Settled> {
+        let unknowns = self.cages.unknown_count();
+        let fits = [from.zeta.len(), from.gradient.len()] == [unknowns; 2]
+            && from.x.len() == self.mesh.cloth_vertex_count
+            && from.steps.is_of(unknowns);
         let going = Going {
-            best: self.restored(&from)?,
-            initial: from.initial,
+            best: fits.then(|| self.restored(&from)).flatten()?,
             steps: from.steps,
+            taken: from.taken,
             slow: from.slow,
-            fresh_starts: from.fresh_starts,
             moved: from.moved,
         };
         Some(self.go_on(going, run))
     }
 
+    /// A guess, draped and noted: where it lies \[m\].
+    pub(super) fn first(
+        &self,
+        guess: Guess,
+        run: &mut Run<'_, '_>,
+    ) -> Result<Vec<Vec3>, RefitError> {
+        let tried = self.candidate(guess.zeta, guess.x, run);
+        let first = self.accept(tried.map_err(|failed| failed.on(self.body))?);
+        run.note(self, &first, 0.0);
+        Ok(first.x)
+    }
+
     /// Steps until there is a reason to stop.
-    fn go_on(&self, going: Going<'s>, mut run: Run<'_, '_>) -> Found {
-        let Going {
-            mut best,
-            initial,
-            mut steps,
-            mut slow,
-            mut fresh_starts,
-            mut moved,
-        } = going;
+    fn go_on(&self, going: Going<'s>, run: &mut Run<'_, '_>) -> Settled {
+        let mut going = going;
         let floor = quality_floor(self.mesh, LEAST_QUALITY);
-        let status = loop {
+        let ending = loop {
             if let Some(keep) = self.keep {
-                let checkpoint = Checkpoint {
-                    params: keep.clone(),
-                    x_star: self.x_star.to_vec(),
-                    initial: initial.clone(),
-                    zeta: best.zeta.clone(),
-                    x: best.x.clone(),
-                    grips: best
-                        .state
-                        .as_ref()
-                        .map_or_else(Vec::new, |s| s.grips().to_vec()),
-                    gradient: best.gradient.clone(),
-                    adjoint_norm: best.adjoint_norm,
-                    residual: best.residual,
-                    shift: best.shift,
-                    steps: steps.clone(),
-                    slow,
-                    fresh_starts,
-                    moved,
-                    notes: run.notes.clone(),
-                    drapes: run.drapes,
-                    factorisations: run.factorisations,
-                    elapsed: run.clock.elapsed(),
-                };
-                let go_on = (run.observe)(&Progress::Checkpoint(Box::new(checkpoint)));
-                run.go_on &= go_on;
+                run.keep(going.checkpoint(keep));
             }
-            if !run.go_on {
-                break Status::Stopped;
+            if run.stopped() {
+                break Ending::Interrupted;
             }
-            if run.notes.len() > self.params.iterations {
-                break Status::IterationLimit;
+            if let Some(ending) = self.ending(&going) {
+                break ending;
             }
-            // Short steps by the gradient alone say nothing: the next may be long again.
-            let short = moved.is_some_and(|moved| moved < self.params.least_step);
-            let still = short && matches!(steps, Steps::Newton(_));
-            let settled = slow >= 2 || still;
-            let mut stepped = Stepped::NoBetter;
-            if !settled {
-                stepped = match &mut steps {
-                    Steps::Newton(damping) => self.newton(&best, floor, damping, &mut run),
-                    Steps::Downhill(slope) => self.downhill(&best, floor, slope, &mut run),
-                };
-            }
-            if matches!(stepped, Stepped::NoBetter) && fresh_starts < self.fresh_starts {
-                fresh_starts += 1;
-                stepped = self.afresh(&best, &mut run);
-            }
+            let best = &going.best;
+            let stepped = match &mut going.steps {
+                Steps::Newton(damping) => self.newton(best, floor, damping, run),
+                Steps::Downhill(slope) => self.downhill(best, floor, slope, run),
+            };
             let next = match stepped {
                 Stepped::Better(next) => next,
-                Stepped::Interrupted => break Status::Stopped,
-                Stepped::NoBetter if slow > 0 || settled => break Status::Converged,
-                Stepped::NoBetter => break Status::Stalled,
+                Stepped::Interrupted => break Ending::Interrupted,
+                Stepped::NoBetter => break Ending::NoBetterStep,
             };
-            let fall = (best.total - next.total) / best.total;
-            slow = if fall < self.params.tolerance {
-                slow + 1
-            } else {
-                0
-            };
+            let slow = best.total - next.total < self.params.tolerance * best.total;
             let far = farthest(&next.x_bar, &best.x_bar);
-            best = next;
-            self.note(&best, far, &mut run);
-            // A fresh start moves nothing: the same pattern, to be searched from again.
-            moved = Some(far).filter(|far| *far > 0.0);
+            going.slow = if slow { going.slow + 1 } else { 0 };
+            going.moved = Some(far);
+            going.taken += 1;
+            going.best = next;
+            run.note(self, &going.best, far);
         };
-        Found {
-            zeta: best.zeta,
-            x_bar: best.x_bar,
-            x: best.x,
-            initial,
-            status,
-            iterations: run.notes,
+        Settled {
+            zeta: going.best.zeta,
+            x: going.best.x,
+            ending,
         }
     }
 
-    /// The initial guess, draped.
-    fn first(&self, zeta: Vec<f64>, run: &mut Run<'_, '_>) -> Result<Box<Point<'s>>, RefitError> {
-        match self.candidate(zeta, self.x_star.to_vec(), run) {
-            Ok(first) => Ok(self.accept(first)),
-            Err(failed) => Err(failed.on(self.body)),
+    /// A reason to take no further step.
+    fn ending(&self, going: &Going<'_>) -> Option<Ending> {
+        let (params, best) = (self.params, &going.best);
+        let promised = best.gradient.norm() * params.step;
+        // Short steps by the gradient alone say nothing: the next may be long again.
+        let newton = matches!(going.steps, Steps::Newton(_));
+        let short = going.moved.is_some_and(|far| far < params.least_step);
+        if going.taken >= params.iterations {
+            Some(Ending::IterationLimit)
+        } else if going.slow >= going.steps.slow_steps() {
+            Some(Ending::SmallChange)
+        } else if short && newton {
+            Some(Ending::ShortStep)
+        } else if promised <= params.tolerance * best.total {
+            Some(Ending::Flat)
+        } else {
+            None
         }
     }
 
@@ -285,17 +244,6 @@ impl<'s, S: Surface> Search<'s, S> {
     fn priors(&self, zeta: &[f64]) -> Vec<Prior> {
         let weights = self.losses.weights();
         self.cages.priors(zeta, weights.affine, weights.cage)
-    }
-
-    /// The pattern at hand, draped again from the target shape: the drape may be caught in a fold
-    /// that a fresh start does not have.
-    fn afresh(&self, best: &Point<'_>, run: &mut Run<'_, '_>) -> Stepped<'s> {
-        let clearly_better = (1.0 - self.params.tolerance) * best.total;
-        match self.candidate(best.zeta.clone(), self.x_star.to_vec(), run) {
-            Ok(next) if next.total < clearly_better => Stepped::Better(self.accept(next)),
-            Err(failed) if failed.status == RestStatus::Stopped => Stepped::Interrupted,
-            _ => Stepped::NoBetter,
-        }
     }
 
     /// The unknowns after `step`, shortened where it moves a pattern vertex too far; none if it
@@ -337,35 +285,31 @@ impl<'s, S: Surface> Search<'s, S> {
             .any(|(a, b)| !((a - b).norm() < FARTHEST_PREDICTION));
         if far { x.clone() } else { moved }
     }
+}
 
-    /// Notes an accepted point, and tells it.
-    fn note(&self, best: &Point<'_>, moved: f64, run: &mut Run<'_, '_>) {
-        let iteration = run.notes.len();
-        run.go_on = (run.observe)(&Progress::Iteration {
-            iteration,
-            loss: best.total,
-            terms: best.loss.terms,
-        });
-        run.notes.push(Iteration {
-            iteration,
-            loss: best.total,
-            shape_matching: best.loss.terms.shape_matching(self.losses.weights()),
-            terms: best.loss.terms,
-            gradient_norm: best.gradient.norm(),
+impl Going<'_> {
+    fn checkpoint(&self, keep: Keep<'_>) -> Checkpoint {
+        let best = &self.best;
+        Checkpoint {
+            params: keep.params.clone(),
+            x_star: keep.x_star.to_vec(),
+            initial: keep.initial.to_vec(),
+            level: keep.level,
+            zeta: best.zeta.clone(),
+            x: best.x.clone(),
+            grips: (best.state.as_ref()).map_or_else(Vec::new, |state| state.grips().to_vec()),
+            gradient: best.gradient.clone(),
             adjoint_norm: best.adjoint_norm,
             residual: best.residual,
             shift: best.shift,
-            moved,
-            drapes: run.drapes,
-            factorisations: run.factorisations,
-            elapsed: run.clock.elapsed(),
-        });
+            steps: self.steps.clone(),
+            taken: self.taken,
+            slow: self.slow,
+            moved: self.moved,
+            notes: Vec::new(),
+            drapes: 0,
+            factorisations: 0,
+            elapsed: 0.0,
+        }
     }
-}
-
-/// How a step ended.
-enum Stepped<'a> {
-    Better(Box<Point<'a>>),
-    NoBetter,
-    Interrupted,
 }

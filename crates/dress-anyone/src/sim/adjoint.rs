@@ -1,8 +1,12 @@
 //! Derivatives of the equilibrium by the rest shape (METHOD §3.2–3.4).
 //!
 //! f(x, x̄) = 0 gives K δx = (∂f/∂x̄) δx̄ with K = −∂f/∂x. One factor of the exact K serves the
-//! adjoint, λ = K⁻¹ x̂ and x̄̂ = λᵀ ∂f/∂x̄, and the sensitivities ∂x/∂ζ. It is the limit of the
+//! adjoint, λ = K⁻¹ x̂ and x̄̂ = λᵀ ∂f/∂x̄, and the sensitivities ∂x/∂ζ; λ gives the gradients by fabrics
+//! ([`fabric`]) and by the body ([`body`]) as well. It is the limit of the
 //! paper's time-stepping adjoint (§3.2) at rest, at the price of one solve.
+
+pub mod body;
+pub mod fabric;
 
 use super::cloth::{Cloth, GRAVITY, Rest};
 use super::energy::{bend, fold, membrane};

@@ -11,7 +11,7 @@ use super::energy::fold::RestFold;
 use super::energy::membrane::RestTriangle;
 use super::material::Material;
 use crate::garment::{Cut, Fabric};
-use crate::geometry::{Vec2, Vec3};
+use crate::geometry::{Vec2, Vec3, cross2};
 use crate::pattern::PatternMesh;
 pub use contacts::ContactPoint;
 use contacts::contact_points;
@@ -49,6 +49,9 @@ pub struct Cloth {
     pub material_of: Vec<u16>,
     /// Vertices kept near a height.
     pub holds: Vec<Hold>,
+    /// Springs that draw every vertex towards a place: the place \[m\] and their stiffness \[N/m\]; none
+    /// at all if nothing guides it. U = ½ Σ k |x − place|². Time steps do not know them.
+    pub guide: Vec<(Vec3, f64)>,
     /// Cloth vertices of each triangle, right side in front.
     pub outward: Vec<[u32; 3]>,
     /// The reference pattern \[m\]: what contact of layers is measured by, constant like
@@ -80,6 +83,17 @@ pub struct Hold {
 }
 
 impl Cloth {
+    /// The same cloth, drawn `towards` a shape \[m\] at `rate` \[1/s²\].
+    #[must_use]
+    pub fn guided(&self, towards: Vec<Vec3>, rate: f64) -> Self {
+        let masses = self.at_rest(&self.reference).mass;
+        let springs = towards.into_iter().zip(masses);
+        Self {
+            guide: springs.map(|(end, mass)| (end, rate * mass)).collect(),
+            ..self.clone()
+        }
+    }
+
     /// Prepares the meshed pattern for draping in `fabric`, every panel on the straight grain.
     pub fn new(mesh: &PatternMesh, fabric: &Fabric) -> Self {
         let cut = Cut {
@@ -121,7 +135,7 @@ impl Cloth {
         Self {
             hinges: hinges(&mesh.triangles, &triangles),
             folds: Vec::new(),
-            contacts: contact_points(mesh, &triangles, friction),
+            contacts: contact_points(&triangles, |t| mesh.rest_area(t, &mesh.x_bar), friction),
             thickness,
             rest_triangles: mesh.triangles.clone(),
             triangles,
@@ -131,6 +145,7 @@ impl Cloth {
             materials,
             material_of,
             holds: Vec::new(),
+            guide: Vec::new(),
             outward: mesh.outward_triangles(),
             reference: mesh.x_bar.clone(),
         }
@@ -146,6 +161,17 @@ impl Cloth {
     pub fn rigidity(&self, hinge: &Hinge) -> f64 {
         let [a, b] = hinge.triangles.map(|t| self.material(t as usize).bending);
         if a == b { a } else { 2.0 * a * b / (a + b) }
+    }
+
+    /// What part of each contact point's friction is that of one of the `materials`, `[contact point]`.
+    pub fn friction_shares(&self, material: usize) -> Vec<f64> {
+        let area = |t: usize| {
+            let [a, b, c] = self.reference_corners(t);
+            0.5 * cross2(b - a, c - a)
+        };
+        let own = |t: usize| f64::from(usize::from(self.material_of[t]) == material);
+        let points = contact_points(&self.triangles, area, own);
+        points.into_iter().map(|point| point.friction).collect()
     }
 
     /// Corners of triangle `t` in the reference pattern \[m\].

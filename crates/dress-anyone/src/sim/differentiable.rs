@@ -1,6 +1,6 @@
 //! A drape with what its derivatives need: polished, its saddles left, its exact stiffness factored.
 
-use super::adjoint;
+use super::adjoint::{self, body, fabric};
 use super::cloth::Cloth;
 use super::drape::{Drape, Scene, system};
 use super::energy::contact::Surface;
@@ -8,8 +8,10 @@ use super::energy::friction::Grip;
 use super::equilibrium::{EquilibriumParams, RestStatus, Touch};
 use super::layers::{Layers, hold_apart};
 use super::system::System;
+use crate::body::DistanceField;
+use crate::garment::Fabric;
 use crate::geometry::sparse::{Factor, GeneralFactor};
-use crate::geometry::{Vec2, Vec3};
+use crate::geometry::{TriangleMesh, Vec2, Vec3};
 
 /// A polished drape with the factor of its exact stiffness: what can be differentiated.
 pub struct Differentiable<'a> {
@@ -192,6 +194,31 @@ impl Differentiable<'_> {
         let drape = &self.drape;
         let hat = adjoint::rest_pull_back(self.cloth, &drape.rest, &drape.x_bar, &drape.x, &lambda);
         (hat, lambda)
+    }
+
+    /// Gradient by the numbers of each of the cloth's materials, in the shape of a fabric, from the adjoint λ
+    /// of [`Self::pull_back`]; `scene` is the one that was draped in. Where one coefficient of friction is
+    /// told for all fabrics, the gradient by it is the sum of theirs; thickness has none.
+    pub fn by_fabrics<S: Surface>(&self, scene: &Scene<'_, S>, lambda: &[Vec3]) -> Vec<Fabric> {
+        let Drape { rest, x, grips, .. } = &self.drape;
+        let mut hats = fabric::fabric_pull_back(self.cloth, rest, x, lambda);
+        let by_friction = fabric::friction_pull_back(&system(scene, rest, grips), x, lambda);
+        for (hat, friction) in hats.iter_mut().zip(by_friction) {
+            hat.friction = friction;
+        }
+        hats
+    }
+
+    /// Gradient by the vertices of `body`, the mesh of the scene's field, from the adjoint λ of
+    /// [`Self::pull_back`].
+    pub fn by_body(
+        &self,
+        scene: &Scene<'_, DistanceField>,
+        body: &TriangleMesh,
+        lambda: &[Vec3],
+    ) -> Vec<Vec3> {
+        let Drape { rest, x, grips, .. } = &self.drape;
+        body::body_pull_back(&system(scene, rest, grips), body, x, lambda)
     }
 
     /// ∂x along each motion of the rest shape, `[motion][vertex]` flattened to x, y, z.

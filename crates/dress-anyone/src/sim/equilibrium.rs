@@ -42,7 +42,7 @@ impl Default for EquilibriumParams {
             iterations: 400,
             step: 0.02,
             cold: 1e3,
-            warm: 30.0,
+            warm: 1.0,
         }
     }
 }

@@ -143,6 +143,9 @@ impl<S: Surface> System<'_, S> {
             let off = x[hold.vertex as usize].y - hold.height;
             sum += 0.5 * hold.stiffness * off * off;
         }
+        for ((place, stiffness), p) in self.cloth.guide.iter().zip(x) {
+            sum += 0.5 * stiffness * (p - place).norm_squared();
+        }
         sum
     }
 
@@ -192,6 +195,9 @@ impl<S: Surface> System<'_, S> {
         for hold in &self.cloth.holds {
             let a = hold.vertex as usize;
             f[a].y -= hold.stiffness * (x[a].y - hold.height);
+        }
+        for ((place, stiffness), (p, f)) in self.cloth.guide.iter().zip(x.iter().zip(&mut f)) {
+            *f -= *stiffness * (p - place);
         }
         f
     }
@@ -274,6 +280,9 @@ impl<S: Surface> System<'_, S> {
             let block = Mat3::from_diagonal(&Vec3::new(0.0, hold.stiffness, 0.0));
             k.add(assembly.vertices[hold.vertex as usize], &block);
         }
+        for ((_, stiffness), slot) in self.cloth.guide.iter().zip(&assembly.vertices) {
+            k.add_scalar(*slot, *stiffness);
+        }
         k
     }
 
@@ -324,6 +333,7 @@ mod tests {
             height: 0.1,
             stiffness: 40.0,
         });
+        let cloth = cloth.guided(fixtures::rolled(&mesh, 0.61, 0.09), 1e4);
         let rest = cloth.at_rest(&mesh.x_bar);
         let surface = Cone {
             radius: 0.09,

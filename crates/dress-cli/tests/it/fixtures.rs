@@ -3,7 +3,7 @@
 use serde_json::{Value, json};
 use std::fmt::Write;
 use std::path::PathBuf;
-use std::process::Command;
+use std::process::{Child, Command};
 use tempfile::TempDir;
 
 /// A folder with a good garment and a good body in it.
@@ -45,6 +45,15 @@ impl Workplace {
             stdout: text(output.stdout),
             stderr: text(output.stderr),
         }
+    }
+
+    /// Starts `dress` here.
+    pub(crate) fn start(&self, arguments: &[&str]) -> Child {
+        Command::new(env!("CARGO_BIN_EXE_dress"))
+            .args(arguments)
+            .current_dir(self.0.path())
+            .spawn()
+            .unwrap()
     }
 
     /// Runs `dress refit` from one body file to the same one, into `out`.

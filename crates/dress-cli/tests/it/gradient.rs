@@ -1,6 +1,9 @@
 //! Gradients, optimisers and checkpoints, as a user meets them.
 
 use crate::fixtures::Workplace;
+use serde_json::Value;
+use std::path::Path;
+use std::time::Duration;
 
 /// Columns of the rows of the table that `check-gradient` prints: move \[mm\] and relative difference.
 fn rows(table: &str) -> Vec<(f64, f64)> {
@@ -32,6 +35,24 @@ fn the_gradient_of_the_built_in_garment_agrees_with_complete_drapes() {
 }
 
 #[test]
+fn a_known_pattern_is_found_again_from_its_drape() {
+    let line = ["check-recovery", "--resolution", "60", "--quiet"];
+    let ran = Workplace::new().dress(&line);
+    assert_eq!(ran.code, 0, "{}", ran.stderr);
+    assert!(!ran.stdout.contains("missed"), "{}", ran.stdout);
+    // 0.15 changes edges by centimetres.
+    let found = ran.stdout.lines().last().unwrap();
+    let mut numbers = found
+        .split_whitespace()
+        .filter_map(|word| word.parse::<usize>().ok());
+    let [found, all] = [(); 2].map(|()| numbers.next().unwrap());
+    assert!(all > 20 && 10 * found >= 9 * all, "{}", ran.stdout);
+
+    let none = Workplace::new().dress(&["check-recovery", "--gradient", "trajectory"]);
+    assert_eq!(none.code, 2, "{}", none.stderr);
+}
+
+#[test]
 fn an_optimizer_that_needs_more_than_a_gradient_is_refused_without_it() {
     let line = ["refit", "--gradient", "trajectory", "--optimizer", "lm"];
     let ran = Workplace::new().dress(&line);
@@ -43,28 +64,49 @@ fn an_optimizer_that_needs_more_than_a_gradient_is_refused_without_it() {
     );
 }
 
+/// Number of accepted steps and level of the search in a checkpoint, once there is one.
+fn noted(path: &Path) -> Option<(usize, u64)> {
+    let state: Value =
+        serde_json::from_slice(&std::fs::read(path).ok()?).expect("never half written");
+    Some((state["notes"].as_array()?.len(), state["level"].as_u64()?))
+}
+
 #[test]
-fn a_resumed_refit_ends_with_the_same_bits() {
+fn a_refit_that_was_killed_at_any_moment_and_resumed_ends_with_the_same_bits() {
     let place = Workplace::new();
-    // The search in stiffer cloth before takes at most eight steps, and so the same in all runs.
-    for (name, iterations) in [("few.toml", 10), ("fewer.toml", 8)] {
-        let text = format!("[descent]\niterations = {iterations}\ntolerance = 0\nleast_step = 0\n");
-        place.file(name, text);
-    }
-    let refit = |params: &str, out: &str, more: &[&str]| {
-        let line = ["refit", "--resolution", "60", "--quiet", "--params", params];
-        let ran = place.dress(&[&line[..], &["--out", out], more].concat());
-        assert_eq!(ran.code, 0, "{}", ran.stderr);
-    };
-    refit("few.toml", "whole", &["--checkpoint", "notes"]);
-    refit("fewer.toml", "part", &["--checkpoint", "notes"]);
-    // As if the run of ten steps had been killed after eight.
+    let few = "coarse = 100\n[descent]\niterations = 5\ntolerance = 0\nleast_step = 0\n";
+    place.file("few.toml", few);
+    let line = [
+        "refit",
+        "--resolution",
+        "60",
+        "--quiet",
+        "--params",
+        "few.toml",
+    ];
+    let whole = place.dress(&[&line[..], &["--out", "whole"]].concat());
+    assert_eq!(whole.code, 0, "{}", whole.stderr);
+
+    // Killed in the coarse mesh, in guided cloth and in free cloth.
     let path = place.path("notes/checkpoint.json");
-    let state = std::fs::read_to_string(&path).unwrap();
-    assert!(state.contains("\"iterations\":8,"));
-    let state = state.replace("\"iterations\":8,", "\"iterations\":10,");
-    std::fs::write(&path, state).unwrap();
-    refit("few.toml", "resumed", &["--resume", "notes"]);
+    for (level, folder) in [(0, "--checkpoint"), (1, "--resume"), (3, "--resume")] {
+        let mut running = place.start(&[&line[..], &["--out", "part", folder, "notes"]].concat());
+        let mut steps = 0;
+        while running.try_wait().unwrap().is_none() {
+            if let Some((now, at)) = noted(&path) {
+                assert!(now >= steps, "a step was lost");
+                steps = now;
+                if at >= level {
+                    running.kill().unwrap();
+                }
+            }
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        assert!(!place.path("part").exists(), "ended before it was killed");
+        assert_eq!(noted(&path).map(|(_, at)| at), Some(level));
+    }
+    let resumed = place.dress(&[&line[..], &["--out", "resumed", "--resume", "notes"]].concat());
+    assert_eq!(resumed.code, 0, "{}", resumed.stderr);
     for name in ["pattern.json", "garment.obj", "initial.obj", "pattern.svg"] {
         let [whole, resumed] =
             ["whole", "resumed"].map(|run| std::fs::read(place.path(run).join(name)).unwrap());

@@ -34,26 +34,35 @@ impl DistanceField {
             .map(|(ordinal, &brick)| {
                 let values = &self.values[ordinal * BRICK..(ordinal + 1) * BRICK];
                 let nodes = self.grid.nodes(brick).zip(values);
-                nodes.map(|(node, d)| self.filled(node, *d)).collect()
+                nodes.map(|(node, d)| self.filled(node, *d).0).collect()
             })
             .collect();
         self.values = filled.concat();
     }
 
-    /// The distance from the filled body at a node of distance `d`.
-    fn filled(&self, node: [usize; 3], d: f64) -> f64 {
+    /// The distance from the filled body at a node of distance `d`, and the node whose distance tells it:
+    /// its own, that of the ball that comes nearest, or none.
+    pub(super) fn filled(&self, node: [usize; 3], d: f64) -> (f64, Option<[usize; 3]>) {
         if !(-DEPTH..BALL).contains(&d) || self.open_above(node, d) {
-            return d;
+            return (d, Some(node));
         }
-        let mut most = BALL - FAR as f64 * self.grid.spacing;
+        let mut most = (BALL - FAR as f64 * self.grid.spacing, None);
         for z in -FAR..=FAR {
             for y in -FAR..=FAR {
                 for x in -FAR..=FAR {
-                    most = most.max(self.room_at(node, [x, y, z]).unwrap_or(most));
+                    let at = neighbour(node, [x, y, z]);
+                    if let Some(room) = self.room_at(node, at).filter(|room| *room > most.0) {
+                        most = (room, Some(at));
+                    }
                 }
             }
         }
-        d.min(most + SLACK * self.grid.spacing)
+        let room = most.0 + SLACK * self.grid.spacing;
+        if d <= room {
+            (d, Some(node))
+        } else {
+            (room, most.1)
+        }
     }
 
     /// Whether the node is as far below the open air above it as it seems.
@@ -69,15 +78,20 @@ impl DistanceField {
             return false;
         };
         let step = up * ABOVE;
-        let room = self.room_at(node, [step.x, step.y, step.z].map(|s| s.round() as isize));
+        let at = neighbour(node, [step.x, step.y, step.z].map(|s| s.round() as isize));
+        let room = self.room_at(node, at);
         room.is_some_and(|room| d <= room + SLACK * self.grid.spacing)
     }
 
-    /// d_k − |p − p_k| for the node k that is `off` from `node`; none where the ball does not fit.
-    fn room_at(&self, node: [usize; 3], off: [isize; 3]) -> Option<f64> {
-        let at: [usize; 3] = std::array::from_fn(|i| node[i].wrapping_add_signed(off[i]));
-        let away = Vec3::from(off.map(|o| o as f64)).norm() * self.grid.spacing;
-        let d = self.values[self.place(at)?];
+    /// d_k − |p − p_k| for the node p and a node k; none where the ball does not fit.
+    fn room_at(&self, node: [usize; 3], k: [usize; 3]) -> Option<f64> {
+        let d = self.values[self.place(k)?];
+        let away = Vec3::from_fn(|i, _| k[i] as f64 - node[i] as f64).norm() * self.grid.spacing;
         (d >= BALL).then_some(d - away)
     }
+}
+
+/// The node that is `off` from `node`; beyond every brick where that is below zero.
+fn neighbour(node: [usize; 3], off: [isize; 3]) -> [usize; 3] {
+    std::array::from_fn(|i| node[i].wrapping_add_signed(off[i]))
 }

@@ -56,7 +56,7 @@ impl<'s, S: Surface> Search<'s, S> {
             slope.length = self.reach(best, &step);
             if can_be_cut(self.cages, self.mesh, &zeta, floor) {
                 let wanted = best.total + WORTH * gradient.dot(&step);
-                match self.candidate(zeta, self.predict(best, &step), run) {
+                match self.trial(zeta, self.predict(best, &step), run) {
                     Err(failed) if failed.status == RestStatus::Stopped => {
                         return Stepped::Interrupted;
                     }

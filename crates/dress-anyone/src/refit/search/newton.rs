@@ -1,7 +1,7 @@
 //! Levenberg–Marquardt steps: from the sensitivities of the drape at hand, by every unknown.
 
 use super::guards::{can_be_cut, without};
-use super::point::{Candidate, Point};
+use super::point::Point;
 use super::{Run, Search, Stepped};
 use crate::cage::Cages;
 use crate::descent::{Damping, Model};
@@ -11,12 +11,9 @@ use crate::pattern::PatternMesh;
 use crate::sim::energy::contact::Surface;
 use crate::sim::equilibrium::RestStatus;
 
-/// The first of two steps may raise the loss to this multiple.
-const RIM: f64 = 1.1;
-
 impl<'s, S: Surface> Search<'s, S> {
-    /// The next pattern: by a step that lowers the loss; or, where the loss has a dent and none
-    /// does to speak of, by two, the first of which may raise it a little.
+    /// Tries ever shorter steps from `best` until the loss falls. A pattern that cannot be cut costs no
+    /// drape.
     pub(super) fn newton(
         &self,
         best: &Point<'_>,
@@ -24,40 +21,9 @@ impl<'s, S: Surface> Search<'s, S> {
         damping: &mut Damping,
         run: &mut Run<'_, '_>,
     ) -> Stepped<'s> {
-        let (stepped, rim) = self.below(best.total, best, floor, damping, run);
-        let so_far = match &stepped {
-            Stepped::Better(next) => next.total,
-            Stepped::NoBetter => best.total,
-            Stepped::Interrupted => return stepped,
-        };
-        let dented = so_far > (1.0 - self.params.tolerance) * best.total;
-        let Some(rim) = rim.filter(|_| dented) else {
-            return stepped;
-        };
-        let mut afresh = Damping(self.params.damping);
-        match self.below(so_far, &self.accept(rim), floor, &mut afresh, run) {
-            (Stepped::NoBetter, _) => stepped,
-            (beyond, _) => {
-                *damping = afresh;
-                beyond
-            }
-        }
-    }
-
-    /// Tries ever shorter steps from `best` until the loss is below `most`. A pattern that cannot be
-    /// cut costs no drape. With it the best of what was refused, if its loss is little more.
-    fn below(
-        &self,
-        most: f64,
-        best: &Point<'_>,
-        floor: f64,
-        damping: &mut Damping,
-        run: &mut Run<'_, '_>,
-    ) -> (Stepped<'s>, Option<Candidate<'s, S>>) {
         let model = self.model(best);
         let rigid = self.cages.rigid_modes(&best.zeta);
         let mut refusals = 0;
-        let mut rim: Option<Candidate<'s, S>> = None;
         while refusals < self.params.refusals {
             let Some(mut step) = model.step(damping.0) else {
                 break;
@@ -66,32 +32,26 @@ impl<'s, S: Surface> Search<'s, S> {
             let Some(zeta) = self.within_reach(best, &mut step) else {
                 break;
             };
-            if !can_be_cut(self.cages, self.mesh, &zeta, floor) {
-                damping.tighten();
-                continue;
+            if can_be_cut(self.cages, self.mesh, &zeta, floor) {
+                match self.trial(zeta, self.predict(best, &step), run) {
+                    Err(failed) if failed.status == RestStatus::Stopped => {
+                        return Stepped::Interrupted;
+                    }
+                    Ok(next) if next.total < best.total => {
+                        damping.relax();
+                        return Stepped::Better(self.accept(next));
+                    }
+                    _ => refusals += 1,
+                }
             }
-            match self.candidate(zeta, self.predict(best, &step), run) {
-                Err(failed) if failed.status == RestStatus::Stopped => {
-                    return (Stepped::Interrupted, None);
-                }
-                Ok(next) if next.total < most => {
-                    damping.relax();
-                    return (Stepped::Better(self.accept(next)), rim);
-                }
-                Ok(next) if next.total < rim.as_ref().map_or(RIM * most, |rim| rim.total) => {
-                    rim = Some(next);
-                }
-                _ => {}
-            }
-            refusals += 1;
             damping.tighten();
         }
-        (Stepped::NoBetter, rim)
+        Stepped::NoBetter
     }
 
     /// The Gauss–Newton model at `best`: residuals of all terms by all unknowns, through drape and
     /// cage.
-    fn model(&self, best: &Point<'_>) -> Model {
+    pub(in crate::refit) fn model(&self, best: &Point<'_>) -> Model {
         let state = best.state.as_ref();
         let state = state.expect("Levenberg–Marquardt goes with drapes at rest alone");
         let moves = state.sensitivities(self.motions.iter().cloned());

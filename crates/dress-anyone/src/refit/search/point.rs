@@ -5,12 +5,12 @@ use super::{Run, Search};
 use crate::descent::Gradient;
 use crate::geometry::{Vec2, Vec3};
 use crate::loss::Loss;
+use crate::refit::RefitError;
 use crate::refit::checkpoint::Checkpoint;
-use crate::refit::{Progress, RefitError};
 use crate::sim::differentiable::{Differentiable, differentiable_at};
 use crate::sim::energy::contact::Surface;
 use crate::sim::equilibrium::RestStatus;
-use crate::sim::{Start, Trajectory, drape};
+use crate::sim::{Scene, SimParams, Start, Trajectory, drape};
 use nalgebra::DVector;
 
 /// Where a drape ended, with what its derivative needs.
@@ -34,13 +34,13 @@ pub(in crate::refit) struct Failed {
 pub(in crate::refit) struct Candidate<'a, S> {
     pub(super) zeta: Vec<f64>,
     pub(in crate::refit) end: End<'a, S>,
-    pub(super) loss: Loss,
+    pub(in crate::refit) loss: Loss,
     /// Weighted loss with the cages' priors.
     pub(in crate::refit) total: f64,
 }
 
 /// A pattern accepted.
-pub(super) struct Point<'a> {
+pub(in crate::refit) struct Point<'a> {
     pub(super) zeta: Vec<f64>,
     pub(super) x: Vec<Vec3>,
     pub(super) x_bar: Vec<Vec2>,
@@ -57,6 +57,12 @@ pub(super) struct Point<'a> {
 }
 
 impl Failed {
+    /// What nothing was tried for.
+    pub(super) const NEVER_TRIED: Self = Self {
+        status: RestStatus::Stopped,
+        residual: f64::NAN,
+    };
+
     /// The failure, told of the body called so.
     pub(in crate::refit) fn on(self, body: &str) -> RefitError {
         if self.status == RestStatus::Stopped {
@@ -118,10 +124,33 @@ impl<'s, S: Surface> Search<'s, S> {
         start: Vec<Vec3>,
         run: &mut Run<'_, '_>,
     ) -> Result<Candidate<'s, S>, Failed> {
+        self.draped(zeta, start, self.scene.params, run)
+    }
+
+    /// The same for a step from a drape: one that takes long to come to rest is not worth it.
+    pub(super) fn trial(
+        &self,
+        zeta: Vec<f64>,
+        start: Vec<Vec3>,
+        run: &mut Run<'_, '_>,
+    ) -> Result<Candidate<'s, S>, Failed> {
+        let mut sim = *self.scene.params;
+        let most = &mut sim.equilibrium.iterations;
+        *most = self.params.patience.min(*most);
+        self.draped(zeta, start, &sim, run)
+    }
+
+    fn draped(
+        &self,
+        zeta: Vec<f64>,
+        start: Vec<Vec3>,
+        sim: &SimParams,
+        run: &mut Run<'_, '_>,
+    ) -> Result<Candidate<'s, S>, Failed> {
         let x_bar = self.cages.deform(&zeta);
-        run.drapes += 1;
+        run.count_drape();
         let end = match self.params.gradient {
-            Gradient::Equilibrium => self.rest(&x_bar, start, run)?,
+            Gradient::Equilibrium => self.rest(&x_bar, start, sim, run)?,
             Gradient::Trajectory => self.path(&x_bar, start, run)?,
         };
         let loss = self.losses.evaluate(end.x(), &x_bar);
@@ -138,12 +167,15 @@ impl<'s, S: Surface> Search<'s, S> {
         &self,
         x_bar: &[Vec2],
         start: Vec<Vec3>,
+        sim: &SimParams,
         run: &mut Run<'_, '_>,
     ) -> Result<End<'s, S>, Failed> {
-        let found = drape(self.scene, x_bar, start, Start::Near, &mut |p| {
-            (run.observe)(&Progress::Drape(p))
-        });
-        run.factorisations += found.iterations;
+        let scene = Scene {
+            params: sim,
+            ..*self.scene
+        };
+        let found = drape(&scene, x_bar, start, Start::Near, &mut |p| run.drapes(p));
+        run.count_factorisations(found.iterations);
         let (status, residual) = (found.status, found.residual);
         let failed = Failed { status, residual };
         if status != RestStatus::AtRest {
@@ -162,9 +194,7 @@ impl<'s, S: Surface> Search<'s, S> {
     ) -> Result<End<'s, S>, Failed> {
         let steps = self.scene.params.step.steps();
         let failed = |status, residual| Failed { status, residual };
-        let found = Trajectory::run(self.scene, x_bar, start, steps, &mut |p| {
-            (run.observe)(&Progress::Drape(p))
-        });
+        let found = Trajectory::run(self.scene, x_bar, start, steps, &mut |p| run.drapes(p));
         let found = found.ok_or(failed(RestStatus::Stopped, f64::NAN))?;
         let residual = found.residual();
         if !residual.is_finite() {
@@ -190,7 +220,7 @@ impl<'s, S: Surface> Search<'s, S> {
 
     /// The candidate with its gradient. Its stiffness is factored anew from its positions alone, so
     /// that a resumed search goes on with the same bits.
-    pub(super) fn accept(&self, mut candidate: Candidate<'s, S>) -> Box<Point<'s>> {
+    pub(in crate::refit) fn accept(&self, mut candidate: Candidate<'s, S>) -> Box<Point<'s>> {
         if let End::Rest(state) = &mut candidate.end {
             let (x, x_bar) = (state.drape.x.clone(), state.drape.x_bar.clone());
             let grips = state.grips().to_vec();

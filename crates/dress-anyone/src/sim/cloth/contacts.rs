@@ -2,7 +2,6 @@
 //! its vertices included. A mesh alone would let the body come through between its vertices.
 
 use crate::geometry::Vec3;
-use crate::pattern::PatternMesh;
 use std::collections::BTreeMap;
 
 /// A point of a triangle that feels the body: p = Σ weight · x over its corners.
@@ -42,27 +41,26 @@ impl ContactPoint {
 /// Farthest that points are apart \[m\]: across it a limb of 25 mm radius bulges by half a millimetre.
 const SPACING: f64 = 10e-3;
 
-/// Pieces into which the sides of triangles are cut.
-fn pieces(mesh: &PatternMesh) -> u32 {
-    let count = mesh.triangles.len().max(1) as f64;
-    let areas = (0..mesh.triangles.len()).map(|t| mesh.rest_area(t, &mesh.x_bar));
+/// Pieces into which the sides of `count` triangles of such areas \[m²\] are cut.
+fn pieces(count: usize, area: impl Fn(usize) -> f64) -> u32 {
+    let mean = (0..count).map(area).sum::<f64>() / count.max(1) as f64;
     // Of an equilateral triangle of mean size.
-    let side = (4.0 / 3.0_f64.sqrt() * areas.sum::<f64>() / count).sqrt();
+    let side = (4.0 / 3.0_f64.sqrt() * mean).sqrt();
     (side / SPACING).ceil().max(1.0) as u32
 }
 
-/// The points of all triangles of `mesh`, whose sewn corners are `welded`, once each, with areas that
-/// integrate over the pieces into which the grid cuts every triangle, and `friction` of triangles.
+/// The points of all `triangles` of the sewn cloth, once each, with areas that integrate over the pieces
+/// into which the grid cuts every triangle, from the triangles' `area` \[m²\] and `friction`.
 pub(super) fn contact_points(
-    mesh: &PatternMesh,
-    welded: &[[u32; 3]],
+    triangles: &[[u32; 3]],
+    area: impl Fn(usize) -> f64,
     friction: impl Fn(usize) -> f64,
 ) -> Vec<ContactPoint> {
-    let pieces = pieces(mesh);
+    let pieces = pieces(triangles.len(), &area);
     // Of every point the corners with their shares, out of all pieces; area, and friction times area.
     let mut sums: BTreeMap<[(u32, u32); 3], [f64; 2]> = BTreeMap::new();
-    for (t, triangle) in welded.iter().enumerate() {
-        let third = mesh.rest_area(t, &mesh.x_bar) / f64::from(3 * pieces * pieces);
+    for (t, triangle) in triangles.iter().enumerate() {
+        let third = area(t) / f64::from(3 * pieces * pieces);
         for i in 0..=pieces {
             for j in 0..=pieces - i {
                 let shares = [pieces - i - j, i, j];
@@ -103,14 +101,19 @@ fn key(triangle: [u32; 3], shares: [u32; 3]) -> [(u32, u32); 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::pattern::PatternMesh;
     use crate::sim::cloth::fixtures;
     use approx::assert_relative_eq;
+
+    fn points(mesh: &PatternMesh) -> Vec<ContactPoint> {
+        contact_points(&mesh.triangles, |t| mesh.rest_area(t, &mesh.x_bar), |_| 0.0)
+    }
 
     #[test]
     fn points_integrate_linear_functions_over_the_cloth() {
         let (width, height) = (0.6, 0.4);
         let mesh = fixtures::sheet(12, 8, 0.05);
-        let points = contact_points(&mesh, &mesh.triangles, |_| 0.0);
+        let points = points(&mesh);
         let x: Vec<Vec3> = mesh
             .x_bar
             .iter()
@@ -130,8 +133,11 @@ mod tests {
     #[test]
     fn points_of_a_side_are_shared_by_its_triangles() {
         let mesh = fixtures::sheet(3, 2, 0.025);
-        assert_eq!(pieces(&mesh), 3);
-        let points = contact_points(&mesh, &mesh.triangles, |_| 0.0);
+        assert_eq!(
+            pieces(mesh.triangles.len(), |t| mesh.rest_area(t, &mesh.x_bar)),
+            3
+        );
+        let points = points(&mesh);
         // Three sides a triangle, two triangles an inner side; ten outer sides. Two points on each side
         // and one in each triangle.
         let sides = usize::midpoint(3 * mesh.triangles.len(), 10);

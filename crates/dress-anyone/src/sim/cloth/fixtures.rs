@@ -26,7 +26,7 @@ pub(crate) fn patched(mesh: &PatternMesh) -> Cloth {
             warp: 120.0,
             bending: 3e-4,
             density: 0.3,
-            friction: 0.05,
+            friction: 0.08,
             ..SOFT
         },
         grain: 35.0,
@@ -35,7 +35,21 @@ pub(crate) fn patched(mesh: &PatternMesh) -> Cloth {
     for of in cloth.material_of.iter_mut().step_by(2) {
         *of = 1;
     }
+    rub(&mut cloth);
     cloth
+}
+
+/// Has the contact points rub as the materials do.
+pub(crate) fn rub(cloth: &mut Cloth) {
+    for point in &mut cloth.contacts {
+        point.friction = 0.0;
+    }
+    for m in 0..cloth.materials.len() {
+        let shares = cloth.friction_shares(m);
+        for (point, share) in cloth.contacts.iter_mut().zip(shares) {
+            point.friction += share * cloth.materials[m].friction;
+        }
+    }
 }
 
 /// A [`tube`] of two fabrics whose seam is pressed.

@@ -135,6 +135,20 @@ pub fn stiffness(
     Some(k * kappa)
 }
 
+/// Gradient of λ·push, where push is the [`force`], by the distance d and by its gradient ∇d at p;
+/// none where there is no contact.
+pub fn distance_pull_back(
+    surface: &impl Surface,
+    kappa: f64,
+    h: f64,
+    p: Vec3,
+    lambda: Vec3,
+) -> Option<(f64, Vec3)> {
+    let (d, n) = surface.distance_below(p, h)?;
+    let [_, push, slope] = response(d, h);
+    Some((-kappa * slope * n.dot(&lambda), lambda * (kappa * push)))
+}
+
 #[cfg(test)]
 pub(crate) mod fixtures {
     //! Solids with closed-form distances.

@@ -92,6 +92,33 @@ impl Grip {
         })
     }
 
+    /// Change of the force with that of the contact's push N n, which load and normal follow, of
+    /// coefficient `mu`; the point stays. None where nothing touches.
+    pub fn follow(&self, mu: f64, kappa: f64, p: Vec3) -> Option<Mat3> {
+        let (k, u) = (TIE * kappa, self.slip(p)?);
+        let (n, load) = (self.normal, self.limit / mu);
+        let w = p - self.anchor?;
+        // The push changes its length by dN = nᵀ d(Nn), its direction by dn = (I − nnᵀ) d(Nn) / N.
+        let turning = (Mat3::identity() - n * n.transpose()) / load;
+        let slipping = turning * n.dot(&w) + n * (w.transpose() * turning);
+        Some(if self.slips(kappa, p) {
+            let (length, t) = (u.norm(), u.normalize());
+            let beside = (Mat3::identity() - t * t.transpose()) * slipping;
+            beside * (self.limit / length) - t * n.transpose() * mu
+        } else {
+            slipping * k
+        })
+    }
+
+    /// Derivative of the force by the coefficient, `mu` \[N\]; zero where it sticks.
+    pub fn by_coefficient(&self, mu: f64, kappa: f64, p: Vec3) -> Vec3 {
+        if self.slips(kappa, p) {
+            self.force(kappa, p) / mu
+        } else {
+            Vec3::zeros()
+        }
+    }
+
     /// What the exact −∂f/∂p \[N/m\] has beyond [`Self::stiffness`]: load and normal follow the
     /// contact, of coefficient `mu`. None where nothing touches.
     pub fn drift(
@@ -101,21 +128,8 @@ impl Grip {
         [kappa, h]: [f64; 2],
         p: Vec3,
     ) -> Option<Mat3> {
-        let (k, u) = (TIE * kappa, self.slip(p)?);
-        let (n, load) = (self.normal, self.limit / mu);
         let pressing = contact::stiffness(surface, kappa, h, p, 1.0)?;
-        let w = p - self.anchor?;
-        let across = Mat3::identity() - n * n.transpose();
-        // The contact's force is N n, so that dN = −nᵀ K dp and dn = −(I − nnᵀ) K dp / N.
-        let turning = -across * pressing / load;
-        let slipping = -turning * n.dot(&w) - n * (w.transpose() * turning);
-        Some(if self.slips(kappa, p) {
-            let (length, t) = (u.norm(), u.normalize());
-            let beside = (Mat3::identity() - t * t.transpose()) * slipping;
-            beside * (self.limit / length) - t * (n.transpose() * pressing) * mu
-        } else {
-            slipping * k
-        })
+        Some(self.follow(mu, kappa, p)? * pressing)
     }
 }
 

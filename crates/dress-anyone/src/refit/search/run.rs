@@ -1,0 +1,116 @@
+//! What a search tells and counts while it runs, through all its levels.
+
+use super::Search;
+use super::point::Point;
+use crate::refit::checkpoint::Checkpoint;
+use crate::refit::{Clock, Observer, Progress};
+use crate::report::Iteration;
+use crate::sim::drape::DrapeProgress;
+
+/// What changes while searching.
+pub(in crate::refit) struct Run<'a, 'b> {
+    notes: Vec<Iteration>,
+    drapes: usize,
+    factorisations: usize,
+    clock: &'a mut Clock,
+    observe: &'a mut Observer<'b>,
+    stopped: bool,
+}
+
+impl<'a, 'b> Run<'a, 'b> {
+    /// Nothing done yet.
+    pub(in crate::refit) fn new(clock: &'a mut Clock, observe: &'a mut Observer<'b>) -> Self {
+        Self {
+            notes: Vec::new(),
+            drapes: 0,
+            factorisations: 0,
+            clock,
+            observe,
+            stopped: false,
+        }
+    }
+
+    /// Goes on counting where a checkpoint was made.
+    pub(in crate::refit) fn take_up(&mut self, from: &Checkpoint) {
+        self.notes.clone_from(&from.notes);
+        self.drapes = from.drapes;
+        self.factorisations = from.factorisations;
+    }
+
+    /// Another stage begins.
+    pub(in crate::refit) fn stage(&mut self, stage: &'static str) {
+        self.clock.stage(stage, self.observe);
+    }
+
+    /// Whether the observer wants no more.
+    pub(in crate::refit) fn stopped(&self) -> bool {
+        self.stopped
+    }
+
+    /// The first guess, then every accepted step.
+    pub(in crate::refit) fn notes(self) -> Vec<Iteration> {
+        self.notes
+    }
+
+    /// Another drape begins.
+    pub(super) fn count_drape(&mut self) {
+        self.drapes += 1;
+    }
+
+    /// A drape took so many.
+    pub(super) fn count_factorisations(&mut self, count: usize) {
+        self.factorisations += count;
+    }
+
+    /// Tells how a drape proceeds; whether to go on with it. Once stopped, what is left to drape is
+    /// draped to its end.
+    pub(super) fn drapes(&mut self, progress: DrapeProgress) -> bool {
+        self.tell(&Progress::Drape(progress))
+    }
+
+    /// Notes an accepted point, and tells it.
+    pub(super) fn note<S>(&mut self, search: &Search<'_, S>, best: &Point<'_>, moved: f64) {
+        let iteration = self.notes.len();
+        self.notes.push(Iteration {
+            iteration,
+            guide: search.guide,
+            loss: best.total,
+            shape_matching: best.loss.terms.shape_matching(search.losses.weights()),
+            terms: best.loss.terms,
+            gradient_norm: best.gradient.norm(),
+            adjoint_norm: best.adjoint_norm,
+            residual: best.residual,
+            shift: best.shift,
+            moved,
+            drapes: self.drapes,
+            factorisations: self.factorisations,
+            elapsed: self.clock.elapsed(),
+        });
+        self.tell(&Progress::Iteration {
+            iteration,
+            loss: best.total,
+            terms: best.loss.terms,
+        });
+    }
+
+    /// Tells that the search may be taken up from here.
+    pub(super) fn keep(&mut self, checkpoint: Checkpoint) {
+        let noted = Checkpoint {
+            notes: self.notes.clone(),
+            drapes: self.drapes,
+            factorisations: self.factorisations,
+            elapsed: self.clock.elapsed(),
+            ..checkpoint
+        };
+        self.tell(&Progress::Checkpoint(Box::new(noted)));
+    }
+
+    /// Whether to go on.
+    fn tell(&mut self, progress: &Progress) -> bool {
+        if !self.stopped {
+            self.stopped = !(self.observe)(progress);
+            return !self.stopped;
+        }
+        true
+    }
+}
