@@ -254,7 +254,7 @@ pub fn refit_from(
         &written.x_bar,
         found.x.clone(),
         Start::Near,
-        &mut |_| true,
+        &mut |_, _| true,
     );
     clock.stage("done", observe);
 
@@ -294,7 +294,9 @@ fn drape_to_rest(
     params: &RefitParams,
     observe: &mut Observer<'_>,
 ) -> Result<Vec<Vec3>, RefitError> {
-    let found = drape_on(garment, body, params, &mut |p| observe(&Progress::Drape(p)));
+    let found = drape_on(garment, body, params, &mut |p, _| {
+        observe(&Progress::Drape(p))
+    });
     if found.status == RestStatus::Stopped {
         return Err(RefitError::Stopped);
     }

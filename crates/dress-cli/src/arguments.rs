@@ -136,6 +136,9 @@ pub struct DrapeArguments {
     /// What brings the cloth to rest [default: static]
     #[arg(long, value_name = "SOLVER")]
     pub solver: Option<SolverKind>,
+    /// Folder for snapshots on the way, numbered, each as OBJ and PNG
+    #[arg(long, value_name = "FOLDER")]
+    pub frames: Option<PathBuf>,
     /// Folder for the results
     #[arg(long, value_name = "FOLDER", default_value = "dress-out")]
     pub out: PathBuf,

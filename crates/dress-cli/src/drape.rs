@@ -2,6 +2,7 @@
 
 use crate::arguments::DrapeArguments;
 use crate::failure::Failure;
+use crate::frames::Frames;
 use crate::inputs::{Gathering, Input, InputReport, note_placement};
 use crate::params::Params;
 use crate::picture::{View, pattern_png};
@@ -53,8 +54,12 @@ pub fn run(arguments: &DrapeArguments) -> Result<String, Failure> {
     progress.stage("drape");
     let start = Instant::now();
     let refit = &params.refit;
-    let found = drape_on(garment, &body, refit, &mut |event| {
+    let mut frames = Frames::default();
+    let found = drape_on(garment, &body, refit, &mut |event, x| {
         progress.drape(event);
+        if arguments.frames.is_some() {
+            frames.see(event, x());
+        }
         !stop.load(Ordering::SeqCst)
     });
     let seconds = start.elapsed().as_secs_f64();
@@ -77,6 +82,9 @@ pub fn run(arguments: &DrapeArguments) -> Result<String, Failure> {
     };
     // What did not come to rest is worth a look, too.
     results(arguments, &loaded, &body, &found, &report)?.write()?;
+    if let Some(folder) = &arguments.frames {
+        frames.write(&found.x, garment, &body, folder)?;
+    }
     let steps_alone = refit.sim.solver == Solver::Xpbd && found.residual.is_finite();
     if !steps_alone {
         accepted?;
@@ -118,6 +126,9 @@ fn read(arguments: &DrapeArguments) -> Result<(Params, Loaded, Body), Failure> {
         Some((file, start.garment))
     });
     gathering.take(check_writable(&arguments.out));
+    if let Some(folder) = &arguments.frames {
+        gathering.take(check_writable(folder));
+    }
     gathering.finish()?;
     let all = params.zip(loaded).zip(body);
     let ((params, mut loaded), body) = all.expect("nothing was wrong with any of them");

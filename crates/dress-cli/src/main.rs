@@ -18,6 +18,7 @@ mod drape;
 mod fabrics;
 mod failure;
 mod fitting;
+mod frames;
 mod inputs;
 mod inspect;
 mod params;

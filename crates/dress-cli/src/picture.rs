@@ -2,17 +2,20 @@
 //!
 //! [`preview`] is a contact sheet: one column per [`Figure`], one row per [`View`], all at one
 //! scale and cut to the height of the clothes. Wrong sides of cloth are plum, so that an
-//! inside-out sleeve is seen at once. [`tiles()`] shows many figures, each at its own scale.
+//! inside-out sleeve is seen at once. [`tiles()`] shows many figures, each at its own scale;
+//! [`film()`] makes a picture of each, all at one scale.
 //! [`pattern_png`] shows a meshed pattern flat.
 
 mod canvas;
 mod colour;
+mod film;
 mod flat;
 mod raster;
 mod scene;
 mod text;
 mod tiles;
 
+pub use film::film;
 pub use flat::pattern_png;
 pub use tiles::tiles;
 

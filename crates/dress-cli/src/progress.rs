@@ -82,14 +82,7 @@ impl<W: Write> Progress<W> {
             return;
         }
         self.passed = Instant::now();
-        let doing = match drape {
-            DrapeProgress::Gathering { step, steps } => format!("gathering, {step} of {steps}"),
-            DrapeProgress::Settling {
-                iteration,
-                residual,
-            } => format!("settling, {iteration}: net force {residual:.1e} of the weight"),
-        };
-        let text = line(&self.stage, &doing, self.start.elapsed());
+        let text = line(&self.stage, &doing(drape), self.start.elapsed());
         self.tell(&text);
     }
 
@@ -140,6 +133,17 @@ impl<W: Write> Progress<W> {
     fn put(&mut self, text: &str) {
         let _ = self.out.write_all(text.as_bytes());
         let _ = self.out.flush();
+    }
+}
+
+/// How far a drape is, in words.
+pub fn doing(drape: DrapeProgress) -> String {
+    match drape {
+        DrapeProgress::Gathering { step, steps } => format!("gathering, {step} of {steps}"),
+        DrapeProgress::Settling {
+            iteration,
+            residual,
+        } => format!("settling, {iteration}: net force {residual:.1e} of the weight"),
     }
 }
 

@@ -154,7 +154,7 @@ fn in_own_pose(
         drape: Some(carried.x_star),
         ..garment.clone()
     };
-    let found = drape_on(&there, &body, params, &mut |_| true);
+    let found = drape_on(&there, &body, params, &mut |_, _| true);
     accept(&found, &body)?;
     Ok((found.x, body))
 }

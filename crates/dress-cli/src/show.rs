@@ -1,6 +1,6 @@
 //! Figures of one garment for the preview.
 
-use crate::picture::{Figure, View, panel_of_triangle, preview, seam_edges};
+use crate::picture::{self, Figure, View, panel_of_triangle, preview, seam_edges};
 use dress_anyone::geometry::{TriangleMesh, Vec3};
 use dress_anyone::pattern::PatternMesh;
 
@@ -23,6 +23,20 @@ pub fn contact_sheet(
     drapes: &[Shown<'_>],
     views: &[View],
 ) -> Vec<u8> {
+    with_figures(mesh, drapes, |figures| preview(title, figures, views))
+}
+
+/// A picture of each drape of one garment, from the front and from aside, as the bytes of PNG files.
+pub fn film(mesh: &PatternMesh, drapes: &[Shown<'_>]) -> Vec<Vec<u8>> {
+    let views = [View::Front, View::ThreeQuarter];
+    with_figures(mesh, drapes, |figures| picture::film(figures, &views))
+}
+
+fn with_figures<T>(
+    mesh: &PatternMesh,
+    drapes: &[Shown<'_>],
+    draw: impl FnOnce(&[Figure<'_>]) -> T,
+) -> T {
     let triangles = mesh.outward_triangles();
     let panels = panel_of_triangle(mesh);
     let seams = seam_edges(mesh);
@@ -40,7 +54,7 @@ pub fn contact_sheet(
             scalar: scalar.as_deref(),
         })
         .collect();
-    preview(title, &figures, views)
+    draw(&figures)
 }
 
 /// Distance of each vertex to where it should be \[m\].

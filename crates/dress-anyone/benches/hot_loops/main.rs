@@ -116,7 +116,7 @@ fn of_size(criterion: &mut Criterion<CpuTime>, size: usize) -> Vec<summary::Row>
     };
     let x_bar = &tube.mesh.x_bar;
     let rest = cloth.at_rest(x_bar);
-    let found = drape(&scene, x_bar, tube.x.clone(), Start::Near, &mut |_| true);
+    let found = drape(&scene, x_bar, tube.x.clone(), Start::Near, &mut |_, _| true);
     let at_rest = found.x.clone();
     let vertices = cloth.vertex_count;
     println!(

@@ -9,7 +9,7 @@ use crate::body::distance_field::DistanceField;
 use crate::garment::Garment;
 use crate::geometry::Vec3;
 use crate::pattern::{Edge, EdgeId};
-use crate::sim::drape::DrapeProgress;
+use crate::sim::drape::Observer;
 use crate::sim::equilibrium::RestStatus;
 use crate::sim::{Assembly, Drape, Hold, OrFabric, Scene, SimParams, Start, drape};
 pub use placed::lift;
@@ -102,7 +102,7 @@ pub fn drape_on(
     garment: &Garment,
     body: &Body,
     params: &RefitParams,
-    observe: &mut dyn FnMut(DrapeProgress) -> bool,
+    observe: &mut Observer<'_>,
 ) -> Drape {
     let (hold, sim) = (&params.hold, &params.sim);
     let surface = DistanceField::new(&body.mesh, DistanceField::SPACING, DistanceField::OUTER);
@@ -165,7 +165,7 @@ impl Dressing<'_> {
         x: Vec<Vec3>,
         start: Start,
         sim: &SimParams,
-        observe: &mut dyn FnMut(DrapeProgress) -> bool,
+        observe: &mut Observer<'_>,
     ) -> Drape {
         let mut cloth = self.params.cloth(garment);
         cloth.holds = holds(garment, placed, self.hold);

@@ -59,7 +59,7 @@ impl Drape {
         let assembly = scene.assembly.clone();
         let mut touch = Touch::at(scene.cloth, &mut self.layers, &self.x, assembly);
         let (factor, shift) = loop {
-            touch = self.settle(scene, touch, sigma, &polish, &mut |_, _| true);
+            touch = self.settle(scene, touch, sigma, &polish, &mut |_, _, _| true);
             let system = system(scene, &self.rest, &self.grips);
             let (factor, shift) = shifted_factor(&system, &touch, &self.x)?;
             if shift == 0.0 || kicks == KICKS {

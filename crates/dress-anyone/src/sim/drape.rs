@@ -71,6 +71,10 @@ pub enum DrapeProgress {
     },
 }
 
+/// Told how far a drape is and, if it asks, the positions \[m\] at that moment, `[cloth vertex]`; may ask to
+/// stop by returning `false`.
+pub type Observer<'a> = dyn FnMut(DrapeProgress, &dyn Fn() -> Vec<Vec3>) -> bool + 'a;
+
 /// Cloth at rest, or as near to it as the search came.
 #[derive(Clone, Debug)]
 pub struct Drape {
@@ -104,14 +108,13 @@ pub struct Scene<'a, S> {
     pub params: &'a SimParams,
 }
 
-/// Drapes `x_bar` on the scene's body, starting at positions `x` \[m\]. `observe` may ask to stop
-/// by returning `false`.
+/// Drapes `x_bar` on the scene's body, starting at positions `x` \[m\].
 pub fn drape<S: Surface>(
     scene: &Scene<'_, S>,
     x_bar: &[Vec2],
     x: Vec<Vec3>,
     start: Start,
-    observe: &mut dyn FnMut(DrapeProgress) -> bool,
+    observe: &mut Observer<'_>,
 ) -> Drape {
     let rest = scene.cloth.at_rest(x_bar);
     let params = scene.params;
@@ -152,12 +155,19 @@ pub fn drape<S: Surface>(
         layers,
         grips,
     };
-    drape.settle(scene, touch, sigma, &search, &mut |iteration, residual| {
-        observe(DrapeProgress::Settling {
-            iteration,
-            residual,
-        })
-    });
+    drape.settle(
+        scene,
+        touch,
+        sigma,
+        &search,
+        &mut |iteration, residual, x| {
+            let progress = DrapeProgress::Settling {
+                iteration,
+                residual,
+            };
+            observe(progress, &|| x.to_vec())
+        },
+    );
     drape
 }
 
@@ -171,7 +181,7 @@ impl Drape {
         mut touch: Touch,
         mut sigma: f64,
         params: &EquilibriumParams,
-        observe: &mut dyn FnMut(usize, f64) -> bool,
+        observe: &mut dyn FnMut(usize, f64, &[Vec3]) -> bool,
     ) -> Touch {
         let before = self.iterations;
         loop {
@@ -188,7 +198,7 @@ impl Drape {
                 std::mem::take(&mut self.x),
                 sigma,
                 &left,
-                &mut |iteration, residual| observe(done + iteration, residual),
+                &mut |iteration, residual, x| observe(done + iteration, residual, x),
             );
             self.x = found.x;
             self.residual = found.residual;
@@ -251,7 +261,7 @@ fn gather<S: Surface>(
     scene: &Scene<'_, S>,
     growth: &[Rest],
     x: Vec<Vec3>,
-    observe: &mut dyn FnMut(DrapeProgress) -> bool,
+    observe: &mut Observer<'_>,
 ) -> Vec<Vec3> {
     let step_params = scene.params.step;
     let mut stepper = Stepper::new(
@@ -267,7 +277,8 @@ fn gather<S: Surface>(
     let steps = step_params.steps();
     for step in 0..2 * steps {
         let enough = step >= steps && !stepper.tangled();
-        if enough || !observe(DrapeProgress::Gathering { step, steps }) {
+        let progress = DrapeProgress::Gathering { step, steps };
+        if enough || !observe(progress, &|| state.x.clone()) {
             break;
         }
         let now = step as f64 / steps as f64;

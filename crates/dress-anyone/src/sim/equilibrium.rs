@@ -145,7 +145,8 @@ const SLIDE_WINDOW: usize = 10;
 const SETTLED_AFTER: usize = 100;
 
 /// Finds the equilibrium near `x`, where layers touch as `touch` says, starting with damping `sigma`.
-/// `observe` is told the iteration and the residual, and may ask to stop by returning `false`.
+/// `observe` is told the iteration, the residual and the positions, and may ask to stop by returning
+/// `false`.
 pub fn find<S: Surface>(
     system: &System<'_, S>,
     layers: &mut Layers,
@@ -153,7 +154,7 @@ pub fn find<S: Surface>(
     mut x: Vec<Vec3>,
     mut sigma: f64,
     params: &EquilibriumParams,
-    observe: &mut dyn FnMut(usize, f64) -> bool,
+    observe: &mut dyn FnMut(usize, f64, &[Vec3]) -> bool,
 ) -> Equilibrium {
     let mut energy = system.energy(&x, &touch.pairs);
     let mut force = system.force(&x, &touch.pairs);
@@ -177,7 +178,7 @@ pub fn find<S: Surface>(
         if iterations >= params.iterations {
             break;
         }
-        if !observe(iterations, residual) {
+        if !observe(iterations, residual, &x) {
             status = RestStatus::Stopped;
             break;
         }

@@ -121,7 +121,7 @@ fn the_gradient_of_the_whole_loss_by_the_cages_agrees_with_complete_drapes() {
         Start::Placed {
             short: mesh.x_bar.clone(),
         },
-        &mut |_| true,
+        &mut |_, _| true,
     );
 
     for kind in [CageKind::Green, CageKind::GreenAffine] {
@@ -145,7 +145,9 @@ fn the_gradient_of_the_whole_loss_by_the_cages_agrees_with_complete_drapes() {
                 .map(|(z, d)| z + s * d)
                 .collect();
             let x_bar = cages.deform(&zeta);
-            let found = drape(&scene, &x_bar, start.to_vec(), Start::Near, &mut |_| true);
+            let found = drape(&scene, &x_bar, start.to_vec(), Start::Near, &mut |_, _| {
+                true
+            });
             let state = found.differentiable(&scene).expect("at rest");
             (losses.evaluate(&state.drape.x, &x_bar).total, state)
         };

@@ -50,7 +50,13 @@ fn a_cloth_laid_on_a_box_is_draped_and_told_of() {
         "--out",
         "out",
     ];
-    let ran = place.dress(&[&line[..], &["--resolution", "35", "--threads", "1"]].concat());
+    // What a longer film left.
+    std::fs::create_dir(place.path("film")).unwrap();
+    for n in 0..300 {
+        std::fs::write(place.path(&format!("film/frame_{n:04}.obj")), "old").unwrap();
+    }
+    let coarse = ["--resolution", "35", "--threads", "1"];
+    let ran = place.dress(&[&line[..], &coarse, &["--frames", "film"]].concat());
     assert_eq!(ran.code, 0, "{}", ran.stderr);
     assert!(ran.stdout.contains("at rest"), "{}", ran.stdout);
     let report = report(&place);
@@ -60,6 +66,20 @@ fn a_cloth_laid_on_a_box_is_draped_and_told_of() {
     for name in ["garment.obj", "pattern.svg", "preview.png", "mesh.png"] {
         assert!(place.path("out").join(name).is_file(), "{name}");
     }
+    // The film ends with the drape, and each of its frames is a garment to start from.
+    let frames = std::fs::read_dir(place.path("film")).unwrap().count() / 2;
+    assert!((3..300).contains(&frames), "{frames}");
+    let read = |file: &str| std::fs::read(place.path(file)).unwrap();
+    let last = frames - 1;
+    assert_eq!(
+        read(&format!("film/frame_{last:04}.obj")),
+        read("out/garment.obj")
+    );
+    let half = format!("film/frame_{:04}.obj", frames / 2);
+    assert!(place.path(&half.replace("obj", "png")).is_file());
+    let again = [&coarse[..], &["--from", &half]].concat();
+    let ran = place.dress(&[&line[..6], &["again"], &again[..]].concat());
+    assert_eq!(ran.code, 0, "{}", ran.stderr);
     // What was written goes into a sheet, and is a garment again.
     let ran = place.dress(&["sheet", "out", "out", "--columns", "1", "--out", "both"]);
     assert_eq!(ran.code, 0, "{}", ran.stderr);

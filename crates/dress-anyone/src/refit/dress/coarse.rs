@@ -9,9 +9,9 @@
 use super::Dressing;
 use super::placed::placed;
 use crate::garment::Garment;
-use crate::geometry::intersections;
+use crate::geometry::{Vec3, intersections};
 use crate::pattern::resample::resample;
-use crate::sim::drape::DrapeProgress;
+use crate::sim::drape::Observer;
 use crate::sim::equilibrium::{EquilibriumParams, RestStatus};
 use crate::sim::{Drape, SimParams, Solver, Start};
 
@@ -28,13 +28,13 @@ pub(super) fn from_panels(
     on: &Dressing<'_>,
     garment: &Garment,
     sim: &SimParams,
-    observe: &mut dyn FnMut(DrapeProgress) -> bool,
+    observe: &mut Observer<'_>,
 ) -> Drape {
     let (placed, short) = placed(garment, on.body);
     // Who asked to stop once is not asked again.
     let mut go_on = true;
-    let mut observe = |progress| {
-        go_on = go_on && observe(progress);
+    let mut observe = |progress, x: &dyn Fn() -> Vec<Vec3>| {
+        go_on = go_on && observe(progress, x);
         go_on
     };
     if let Some(coarse) = coarser(garment, sim) {
@@ -45,8 +45,11 @@ pub(super) fn from_panels(
             },
             ..*sim
         };
-        let found = from_panels(on, &coarse, &nearly, &mut observe);
-        let carried = resample(&coarse.mesh, &found.x, &garment.mesh);
+        let carry = |x: &[Vec3]| resample(&coarse.mesh, x, &garment.mesh);
+        let found = from_panels(on, &coarse, &nearly, &mut |progress, x| {
+            observe(progress, &|| carry(&x()))
+        });
+        let carried = carry(&found.x);
         let apart = || intersections::within(&carried, &garment.mesh.cloth_triangles()).is_empty();
         if found.status == RestStatus::AtRest && apart() {
             let mut drape = on.drape(garment, &placed, carried, Start::Near, sim, &mut observe);

@@ -174,7 +174,7 @@ impl<'s, S: Surface> Search<'s, S> {
             params: sim,
             ..*self.scene
         };
-        let found = drape(&scene, x_bar, start, Start::Near, &mut |p| run.drapes(p));
+        let found = drape(&scene, x_bar, start, Start::Near, &mut |p, _| run.drapes(p));
         run.count_factorisations(found.iterations);
         let (status, residual) = (found.status, found.residual);
         let failed = Failed { status, residual };

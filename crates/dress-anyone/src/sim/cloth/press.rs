@@ -135,7 +135,9 @@ mod tests {
             surface: &Nothing,
             params: &params,
         };
-        let found = drape(&scene, &garment.mesh.x_bar, x, Start::Near, &mut |_| true);
+        let found = drape(&scene, &garment.mesh.x_bar, x, Start::Near, &mut |_, _| {
+            true
+        });
         assert_eq!(found.status, RestStatus::AtRest);
         let at = |fold: &Fold| angle(fold.hinge.vertices.map(|a| found.x[a as usize]));
         cloth.folds.iter().map(at).collect()

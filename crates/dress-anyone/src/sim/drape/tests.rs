@@ -29,7 +29,7 @@ fn scene<'a, S>(
 }
 
 fn settle<S: Surface>(scene: &Scene<'_, S>, x_bar: &[Vec2], x: Vec<Vec3>) -> Drape {
-    let drape = drape(scene, x_bar, x, Start::Near, &mut |_| true);
+    let drape = drape(scene, x_bar, x, Start::Near, &mut |_, _| true);
     assert_eq!(
         drape.status,
         RestStatus::AtRest,
@@ -192,7 +192,7 @@ fn a_tube_that_began_short_grows_to_where_one_hangs_that_did_not() {
         short: short.collect(),
     };
     let low = x.iter().map(|p| Vec3::new(p.x, 0.7 * p.y, p.z)).collect();
-    let grown = drape(&scene, &mesh.x_bar, low, start, &mut |_| true);
+    let grown = drape(&scene, &mesh.x_bar, low, start, &mut |_, _| true);
     assert_eq!(grown.status, RestStatus::AtRest);
     let height = |x: &[Vec3]| {
         let (low, high) = (x.iter()).fold((0.0_f64, f64::NEG_INFINITY), |(l, h), p| {

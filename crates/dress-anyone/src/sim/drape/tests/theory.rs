@@ -46,7 +46,7 @@ fn a_tight_tube_presses_as_laplace_says() {
     let scene = scene(&cloth, &assembly, &cylinder, &params);
     let x = fixtures::rolled(&mesh, 0.6, 0.1001);
     let rest = cloth.at_rest(&mesh.x_bar);
-    let drape = drape(&scene, &mesh.x_bar, x, Start::Near, &mut |_| true);
+    let drape = drape(&scene, &mesh.x_bar, x, Start::Near, &mut |_, _| true);
     let system = system(&scene, &rest, &[]);
     assert_eq!(drape.status, RestStatus::AtRest);
     let push: f64 = cloth
@@ -78,7 +78,7 @@ fn a_sheet_on_the_floor_sinks_in_by_its_weight() {
         .iter()
         .map(|p| Vec3::new(p.x, 0.004, p.y))
         .collect();
-    let drape = drape(&scene, &mesh.x_bar, x, Start::Near, &mut |_| true);
+    let drape = drape(&scene, &mesh.x_bar, x, Start::Near, &mut |_, _| true);
     let depth = 0.2 * 9.81 / params.contact.stiffness;
     for p in &drape.x {
         assert_relative_eq!(p.y, params.contact.thickness - depth, max_relative = 1e-6);
@@ -97,7 +97,7 @@ fn what_nothing_holds_falls_and_is_reported() {
         .iter()
         .map(|p| Vec3::new(p.x, p.y, 0.0))
         .collect();
-    let drape = drape(&scene, &mesh.x_bar, x, Start::Near, &mut |_| true);
+    let drape = drape(&scene, &mesh.x_bar, x, Start::Near, &mut |_, _| true);
     assert_eq!(drape.status, RestStatus::Sliding);
 }
 
@@ -131,7 +131,9 @@ fn a_sheet_on_an_incline_sticks_iff_it_is_less_steep_than_the_friction() {
             .map(|p| Vec3::new(p.x, slope * p.x, 0.0) / slope.hypot(1.0) + Vec3::z() * p.y)
             .map(|p| p + Vec3::y() * 2e-3)
             .collect();
-        let found = drape(&scene, &mesh.x_bar, x.clone(), Start::Near, &mut |_| true);
+        let found = drape(&scene, &mesh.x_bar, x.clone(), Start::Near, &mut |_, _| {
+            true
+        });
         assert_eq!(
             found.status == RestStatus::AtRest,
             sticks,
@@ -218,7 +220,13 @@ fn sag(rows: usize) -> f64 {
     let params = firm_contact();
     let scene = scene(&cloth, &assembly, &Nothing, &params);
     let x = mesh.x_bar.iter().map(|p| Vec3::new(p.x, 0.0, p.y));
-    let found = drape(&scene, &mesh.x_bar, x.collect(), Start::Near, &mut |_| true);
+    let found = drape(
+        &scene,
+        &mesh.x_bar,
+        x.collect(),
+        Start::Near,
+        &mut |_, _| true,
+    );
     assert!(found.residual < 1e-4, "{}", found.residual);
     -found.x[at(columns / 2, rows + 1) as usize].y
 }

@@ -68,7 +68,7 @@ fn from_rest<S: Surface>(
         surface,
         params: &params,
     };
-    let found = drape(&scene, &mesh.x_bar, x, Start::Near, &mut |_| true);
+    let found = drape(&scene, &mesh.x_bar, x, Start::Near, &mut |_, _| true);
     assert_eq!(found.status, RestStatus::AtRest);
     let rest = found.differentiable(&scene).expect("a minimum");
     assert_eq!(rest.shift, 0.0);
