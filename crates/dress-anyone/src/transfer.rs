@@ -2,10 +2,11 @@
 //! O'Malley 2020). Geometry only: not physical, no pattern.
 //!
 //! 1. Carry every cloth vertex from the space around the source body to that around the target
-//!    (`bind`).
-//! 2. Repeat: give it back its distance to the body (`ease`), and relax (`relax`), which keeps the
-//!    garment's layout, lines and layers (`layout`, `layers`) through affine-invariant stencils. Along
-//!    the body cloth is held softly, across it firmly (`hold`).
+//!    (`bind`), both with parts that overlap drawn apart (`part`).
+//! 2. Repeat: give what touches the body its distance to it (`settle`, `ease`), and relax (`relax`), which
+//!    keeps the garment's layout, lines and layers (`layout`, `layers`) through affine-invariant stencils.
+//!    Along the body cloth is held softly, across it firmly where it touches (`hold`); off the body it
+//!    hangs, and bridges (`hang`).
 //! 3. Take it out of the body (`clear`), and where triangles met it, relax once more.
 //!
 //! Departures from the original: binding is to a smooth patch of body, not to a closest point, and
@@ -21,6 +22,7 @@ mod hold;
 mod layers;
 mod layout;
 mod paint;
+mod part;
 mod relax;
 mod room;
 mod settle;
@@ -93,7 +95,8 @@ pub struct Target {
     pub iterations: usize,
     /// Whether the loop ended by its tolerance.
     pub converged: bool,
-    /// Signed distances to the target body \[m\], `[cloth vertex]`.
+    /// Signed distances to the target body \[m\], `[cloth vertex]`; to its parts drawn apart, where they go
+    /// through each other.
     pub clearance: Vec<f64>,
 }
 
@@ -138,10 +141,11 @@ pub fn target_shape(
     params: &TransferParams,
 ) -> Result<Target, TransferError> {
     check(drape, &layout.triangles, source, target)?;
-    let surfaces = [source, target].map(|body| ClosestPoint::new(&body.mesh));
+    let skins = [source, target].map(|body| part::parted(&body.mesh));
+    let surfaces = [0, 1].map(|k| ClosestPoint::new(&skins[k]));
     let [on_source, on_target] = &surfaces;
     let draped = Draped::new(drape, &layout.triangles, (source, on_source));
-    let map = BodyMap::new(&source.mesh, &target.mesh);
+    let map = BodyMap::new(&skins[0], &skins[1]);
     let bound: Vec<Carried> = (0..drape.len())
         .into_par_iter()
         .map(|v| {
@@ -200,7 +204,7 @@ pub fn target_shape(
     let homes = bound.iter().zip(drape).map(home).collect();
     let clearing = Clearing::new(
         on_target,
-        &target.mesh,
+        &skins[1],
         &layout.triangles,
         &draped.rings,
         homes,

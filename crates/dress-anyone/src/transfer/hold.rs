@@ -85,7 +85,7 @@ pub(super) fn firmness(
         Firmness {
             touching: firmness(grip * params.spacing),
             loose: firmness(LOOSE),
-            along: firmness(grip * blend(DRIFT, params.place, rims.grips[v])),
+            along: firmness(grip * blend(DRIFT.max(params.place), params.place, rims.grips[v])),
             line: across[v].cross(&line) * firmness(part * params.place).sqrt(),
         }
     };
