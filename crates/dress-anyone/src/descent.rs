@@ -147,6 +147,11 @@ impl Model {
         definite.map_or(by * f64::INFINITY, |h| h.solve(by))
     }
 
+    /// By how much the loss falls along `step`.
+    pub fn promise(&self, step: &DVector<f64>) -> f64 {
+        -(2.0 * self.g.dot(step) + step.dot(&(&self.h * step)))
+    }
+
     /// The step for damping `mu`; none if the model is not finite.
     pub fn step(&self, mu: f64) -> Option<DVector<f64>> {
         let n = self.g.len();
@@ -192,6 +197,9 @@ mod tests {
         let solution = DVector::from_row_slice(&[0.7, -0.4]);
         let model = model(&j, &(-&j * &solution));
         let step = model.step(0.0).expect("full rank");
+        // What it promises is all of the loss.
+        let all = (&j * &solution).norm_squared();
+        assert!((model.promise(&step) - all).abs() < 1e-12 * all);
         assert!((step - solution).norm() < 1e-12);
     }
 

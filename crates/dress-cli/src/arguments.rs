@@ -105,6 +105,12 @@ pub struct CheckGradientArguments {
     /// Random directions along which to compare
     #[arg(long, value_name = "N", default_value = "3")]
     pub directions: NonZeroUsize,
+    /// Draw the loss and its slopes along the first direction into this file (SVG) instead
+    #[arg(long, value_name = "FILE")]
+    pub plot: Option<PathBuf>,
+    /// How far the pattern moves in the plot, either way
+    #[arg(long, value_name = "MM", value_parser = positive, default_value = "2", requires = "plot")]
+    pub reach: f64,
 }
 
 /// `dress check-recovery`.

@@ -1,15 +1,26 @@
 //! `dress check-gradient`.
 
+mod plot;
+
 use crate::arguments::CheckGradientArguments;
 use crate::failure::Failure;
 use crate::fitting::Inputs;
 use crate::progress::{Progress, stop_on_ctrl_c};
 use anyhow::Context;
-use dress_anyone::refit::gradient_check::{GradientCheck, TRUSTED, check_gradient};
+use dress_anyone::io::output::Output;
+use dress_anyone::refit::gradient_check::{
+    GradientCheck, Line, TRUSTED, check_gradient, loss_along,
+};
 use std::fmt::Write;
+use std::path::Path;
 use std::sync::atomic::Ordering;
 
-/// Compares; the table.
+/// Part of a change of the loss to which the slopes at both ends must tell it.
+const PLOT_TRUSTED: f64 = 0.05;
+/// Points of a plot on either side.
+const POINTS: usize = 40;
+
+/// Compares; the table, or where the plot is.
 pub fn run(arguments: &CheckGradientArguments) -> Result<String, Failure> {
     let mut progress = Progress::new(arguments.fitting.pair.running.quiet);
     let inputs = Inputs::read(
@@ -19,20 +30,42 @@ pub fn run(arguments: &CheckGradientArguments) -> Result<String, Failure> {
         &mut progress,
     )?;
     let stop = stop_on_ctrl_c().context("Ctrl-C cannot be listened to")?;
-    let checked = check_gradient(
-        &inputs.loaded.garment,
-        &inputs.source,
-        &inputs.target,
-        &inputs.params.refit,
-        arguments.directions.get(),
-        &mut |event| {
-            progress.event(event);
-            !stop.load(Ordering::SeqCst)
-        },
-    );
+    let garment = &inputs.loaded.garment;
+    let bodies = [&inputs.source, &inputs.target];
+    let params = &inputs.params.refit;
+    let mut observe = |event: &_| {
+        progress.event(event);
+        !stop.load(Ordering::SeqCst)
+    };
+    if let Some(plot) = &arguments.plot {
+        let reach = (1e-3 * arguments.reach, POINTS);
+        let line = loss_along(garment, bodies, params, reach, &mut observe);
+        progress.close();
+        let line = line.map_err(|error| inputs.failure(error))?;
+        let title = format!("{}: loss by farthest move of the pattern", garment.name);
+        let mut output = Output::new(plot.parent().unwrap_or(Path::new("")));
+        let name = plot.file_name().context("a plot is a file")?;
+        output.add(name.to_string_lossy(), plot::svg(&title, &line));
+        output.write()?;
+        return Ok(told(&line, plot));
+    }
+    let count = arguments.directions.get();
+    let checked = check_gradient(garment, bodies, params, count, &mut observe);
     progress.close();
     let checked = checked.map_err(|error| inputs.failure(error))?;
-    Ok(table(&inputs.loaded.garment.name, &checked))
+    Ok(table(&garment.name, &checked))
+}
+
+/// How far loss and slopes go together, in a sentence.
+fn told(line: &Line, plot: &Path) -> String {
+    let all = line.steps().count();
+    let agreeing = line.steps().filter(|off| *off < PLOT_TRUSTED).count();
+    format!(
+        "From point to point the loss changes as the slopes say, to {PLOT_TRUSTED} of it, in {agreeing} of {all} \
+         steps of {} mm.\nWritten to {}\n",
+        millimetres(line.moves[1] - line.moves[0]),
+        plot.display()
+    )
 }
 
 /// A row for each direction and step.

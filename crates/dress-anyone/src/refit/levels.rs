@@ -70,14 +70,16 @@ pub(super) fn searched(
             },
             Ok(found) => from_target(on, found.zeta.clone()),
         }];
-        if level.rate == 0.0 {
-            guesses.push(Guess {
-                zeta: prepared.initial(),
-                x: initial.clone(),
-            });
+        guesses.push(if level.rate == 0.0 {
+            let x = initial.clone();
+            let zeta = on.initial();
+            Guess { zeta, x }
         } else if number == 0 {
-            guesses.push(from_target(on, on.initial()));
-        }
+            from_target(on, on.initial())
+        } else {
+            // Not caught in what the last level was.
+            from_target(on, guesses[0].zeta.clone())
+        });
         run.stage(level.stage());
         let keep = Keep {
             params: prepared.params,

@@ -90,6 +90,8 @@ pub(super) enum Steps {
 /// How a step ended.
 enum Stepped<'a> {
     Better(Box<Point<'a>>),
+    /// No step promises to lower the loss to speak of.
+    Level,
     NoBetter,
     Interrupted,
 }
@@ -203,6 +205,7 @@ impl<'s, S: Surface> Search<'s, S> {
             let next = match stepped {
                 Stepped::Better(next) => next,
                 Stepped::Interrupted => break Ending::Interrupted,
+                Stepped::Level => break Ending::Flat,
                 Stepped::NoBetter => break Ending::NoBetterStep,
             };
             let slow = best.total - next.total < self.params.tolerance * best.total;

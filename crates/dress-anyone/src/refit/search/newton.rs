@@ -12,8 +12,8 @@ use crate::sim::energy::contact::Surface;
 use crate::sim::equilibrium::RestStatus;
 
 impl<'s, S: Surface> Search<'s, S> {
-    /// Tries ever shorter steps from `best` until the loss falls. A pattern that cannot be cut costs no
-    /// drape.
+    /// Tries ever shorter steps from `best` until the loss falls, as long as they promise a fall to speak
+    /// of. A pattern that cannot be cut costs no drape.
     pub(super) fn newton(
         &self,
         best: &Point<'_>,
@@ -32,6 +32,12 @@ impl<'s, S: Surface> Search<'s, S> {
             let Some(zeta) = self.within_reach(best, &mut step) else {
                 break;
             };
+            if model.promise(&step) < self.params.tolerance * best.total {
+                return match refusals {
+                    0 => Stepped::Level,
+                    _ => Stepped::NoBetter,
+                };
+            }
             if can_be_cut(self.cages, self.mesh, &zeta, floor) {
                 match self.trial(zeta, self.predict(best, &step), run) {
                     Err(failed) if failed.status == RestStatus::Stopped => {
