@@ -157,7 +157,7 @@ pub enum RefitError {
     #[error(transparent)]
     Transfer(#[from] TransferError),
     /// The garment does not come to rest on a body.
-    #[error("{}", does_not_rest(.body, *.status, *.residual))]
+    #[error("{}", does_not_rest(.body, *.status, *.residual, .broken.as_deref()))]
     NotAtRest {
         /// Name of the body.
         body: String,
@@ -165,6 +165,8 @@ pub enum RefitError {
         status: RestStatus,
         /// ‖f‖/(‖m‖|g|).
         residual: f64,
+        /// Where it broke down, if it did.
+        broken: Option<String>,
     },
     /// The checkpoint is of another refit.
     #[error(
@@ -177,7 +179,7 @@ pub enum RefitError {
     Stopped,
 }
 
-fn does_not_rest(body: &str, status: RestStatus, residual: f64) -> String {
+fn does_not_rest(body: &str, status: RestStatus, residual: f64, broken: Option<&str>) -> String {
     match status {
         RestStatus::Sliding => format!(
             "the garment slides off the body `{body}`: nothing holds it. Label the edges of its \
@@ -186,8 +188,9 @@ fn does_not_rest(body: &str, status: RestStatus, residual: f64) -> String {
              (`sim.contact.friction`, say 0.4, or \"fabric\")"
         ),
         RestStatus::NotFinite => format!(
-            "the drape on the body `{body}` broke down (positions are no longer numbers). Check \
-             the unit of the garment, and its placement around the body"
+            "the drape on the body `{body}` broke down (positions are no longer numbers){}. Check \
+             the unit of the garment, its fabric, and its placement around the body",
+            broken.map(|told| format!(" {told}")).unwrap_or_default()
         ),
         _ => format!(
             "the garment does not come to rest on the body `{body}` (force residual {residual:.1e} \
@@ -300,12 +303,12 @@ fn drape_to_rest(
     if found.status == RestStatus::Stopped {
         return Err(RefitError::Stopped);
     }
-    accept(&found, body)?;
+    accept(&found, garment, body)?;
     Ok(found.x)
 }
 
-/// Refuses a drape that is not nearly at rest on `body`.
-pub fn accept(found: &crate::sim::Drape, body: &Body) -> Result<(), RefitError> {
+/// Refuses a drape of `garment` that is not nearly at rest on `body`.
+pub fn accept(found: &crate::sim::Drape, garment: &Garment, body: &Body) -> Result<(), RefitError> {
     let near = found.residual < NEARLY_AT_REST && found.status != RestStatus::Sliding;
     if found.status == RestStatus::AtRest || near {
         return Ok(());
@@ -314,6 +317,7 @@ pub fn accept(found: &crate::sim::Drape, body: &Body) -> Result<(), RefitError> 
         body: body.name.clone(),
         status: found.status,
         residual: found.residual,
+        broken: (found.broken).map(|broken| broken.told(&garment.pattern, &garment.mesh)),
     })
 }
 

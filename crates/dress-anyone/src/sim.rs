@@ -8,6 +8,7 @@
 //! differentiates as the paper does: by time steps alone, and all of them.
 
 pub mod adjoint;
+pub mod broken;
 pub mod cloth;
 pub mod differentiable;
 pub mod drape;
@@ -15,9 +16,12 @@ pub mod energy;
 pub mod equilibrium;
 pub mod layers;
 pub mod material;
+#[cfg(test)]
+mod properties;
 pub mod step;
 pub mod system;
 pub mod trajectory;
+pub use broken::Broken;
 pub use cloth::{Cloth, Fold, Hold, Rest};
 pub use differentiable::Differentiable;
 pub use drape::{Drape, Scene, SimParams, Solver, Start, drape};

@@ -64,7 +64,7 @@ pub fn run(arguments: &DrapeArguments) -> Result<String, Failure> {
     });
     let seconds = start.elapsed().as_secs_f64();
     progress.close();
-    let accepted = accept(&found, &body);
+    let accepted = accept(&found, garment, &body);
     if found.status == RestStatus::Stopped && accepted.is_err() {
         return Err(RefitError::Stopped.into());
     }

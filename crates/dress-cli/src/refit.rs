@@ -155,7 +155,7 @@ fn in_own_pose(
         ..garment.clone()
     };
     let found = drape_on(&there, &body, params, &mut |_, _| true);
-    accept(&found, &body)?;
+    accept(&found, &there, &body)?;
     Ok((found.x, body))
 }
 

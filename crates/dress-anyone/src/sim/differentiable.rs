@@ -108,6 +108,7 @@ pub fn differentiable_at<'a, S: Surface>(
         iterations: 0,
         status: RestStatus::AtRest,
         friction: scene.params.contact.friction,
+        broken: None,
         rest,
         layers,
         grips,

@@ -1,5 +1,6 @@
 //! The drape: from placed panels, or from a nearby drape, to rest.
 
+use super::broken::{Broken, Stage};
 use super::cloth::{Cloth, Rest};
 use super::energy::contact::{ContactParams, Surface};
 use super::energy::friction::Grip;
@@ -90,6 +91,8 @@ pub struct Drape {
     pub status: RestStatus,
     /// Coulomb's coefficient of cloth on the body \[–\].
     pub friction: OrFabric,
+    /// Where positions or forces stopped being numbers; `x` is from before then.
+    pub broken: Option<Broken>,
     pub(super) rest: Rest,
     pub(super) layers: Layers,
     /// Friction of each contact point; none without friction.
@@ -123,12 +126,12 @@ pub fn drape<S: Surface>(
         Start::Near if params.solver == Solver::Xpbd => Some(x_bar.to_vec()),
         Start::Near => None,
     };
-    let (x, sigma) = match begun_as {
+    let ((x, broken), sigma) = match begun_as {
         Some(short) => (
             gather(scene, &growth(scene.cloth, &short, x_bar), x, observe),
             params.equilibrium.cold,
         ),
-        None => (x, params.equilibrium.warm),
+        None => ((x, None), params.equilibrium.warm),
     };
     let search = EquilibriumParams {
         iterations: match params.solver {
@@ -151,10 +154,15 @@ pub fn drape<S: Surface>(
         iterations: 0,
         status: RestStatus::IterationLimit,
         friction: params.contact.friction,
+        broken,
         rest,
         layers,
         grips,
     };
+    if broken.is_some() {
+        drape.status = RestStatus::NotFinite;
+        return drape;
+    }
     drape.settle(
         scene,
         touch,
@@ -205,6 +213,10 @@ impl Drape {
             self.status = found.status;
             self.iterations += found.iterations;
             (touch, sigma) = (found.touch, 0.0);
+            if self.status == RestStatus::NotFinite {
+                let stage = Stage::Iteration(self.iterations);
+                self.broken = Broken::at(stage, scene.cloth, &self.rest, &self.x);
+            }
             let still = found.iterations == 0 || self.grips.is_empty();
             if still || found.status != RestStatus::AtRest {
                 return touch;
@@ -256,13 +268,14 @@ fn growth(cloth: &Cloth, short: &[Vec2], x_bar: &[Vec2]) -> Vec<Rest> {
     (STAGES - stages..=STAGES).map(grown).collect()
 }
 
-/// XPBD from rest at `x` for the configured time, through the stages of `growth`.
+/// XPBD from rest at `x` for the configured time, through the stages of `growth`. Where positions stop being
+/// numbers, the last that were.
 fn gather<S: Surface>(
     scene: &Scene<'_, S>,
     growth: &[Rest],
     x: Vec<Vec3>,
     observe: &mut Observer<'_>,
-) -> Vec<Vec3> {
+) -> (Vec<Vec3>, Option<Broken>) {
     let step_params = scene.params.step;
     let mut stepper = Stepper::new(
         scene.cloth,
@@ -283,11 +296,17 @@ fn gather<S: Surface>(
         }
         let now = step as f64 / steps as f64;
         let grown = ((now - GROWING[0]) / (GROWING[1] - GROWING[0])).clamp(0.0, 1.0);
-        stepper.grow(&growth[(grown * (growth.len() - 1) as f64) as usize]);
+        let rest = &growth[(grown * (growth.len() - 1) as f64) as usize];
+        stepper.grow(rest);
+        let before = state.x.clone();
         let left = 1.0 - now / INFLATED;
         stepper.step(&mut state, step_params.inflation * left.max(0.0));
+        if !state.x.iter().all(|p| p.iter().all(|c| c.is_finite())) {
+            let broken = Broken::at(Stage::Step(step), scene.cloth, rest, &before);
+            return (before, broken);
+        }
     }
-    state.x
+    (state.x, None)
 }
 
 #[cfg(test)]

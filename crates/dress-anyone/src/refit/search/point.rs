@@ -72,6 +72,7 @@ impl Failed {
             body: body.to_owned(),
             status: self.status,
             residual: self.residual,
+            broken: None,
         }
     }
 }
