@@ -253,3 +253,106 @@ fn what_cannot_be_carried_says_why() {
     let error = carry(&drape, &triangles, &source, &source, &params).unwrap_err();
     assert_eq!(error, TransferError::NotFinite("the drape".to_owned()));
 }
+
+/// Vertices of `x` within this distance of a place on the ball.
+fn cap(x: &[Vec3], reach: f64) -> Vec<bool> {
+    let near = |p: &Vec3| (p - Vec3::z() * 0.5).norm() < reach;
+    x.iter().map(near).collect()
+}
+
+#[test]
+fn a_badge_keeps_its_size_on_a_larger_body() {
+    let (source, drape, triangles) = dressed();
+    let target = moved(&source, |p| p * 1.3);
+    let mut layout = Layout::plain(drape.len(), triangles, Ease::Relative);
+    let badge = cap(&drape, 0.15);
+    let inside = |t: &&[u32; 3]| t.iter().all(|v| badge[*v as usize]);
+    let sides = |&[a, b, c]: &[u32; 3]| [[a, b], [b, c], [c, a]];
+    layout.kept = layout
+        .triangles
+        .iter()
+        .filter(inside)
+        .flat_map(sides)
+        .collect();
+    let params = TransferParams::default();
+    let found = target_shape(&drape, &layout, &source, &target, &params).unwrap();
+    let length = |x: &[Vec3], [a, b]: [u32; 2]| (x[a as usize] - x[b as usize]).norm();
+    let growth = |of: &mut dyn Iterator<Item = [u32; 2]>| {
+        let (before, after) = of.fold((0.0, 0.0), |(before, after), side| {
+            let after = after + length(&found.x_star, side);
+            (before + length(&drape, side), after)
+        });
+        after / before
+    };
+    let kept = growth(&mut layout.kept.iter().copied());
+    // Springs of 3 against holds: next to nothing of 30 %.
+    assert!((kept - 1.0).abs() < 0.03, "{kept}");
+    let far = cap(&drape, 0.6);
+    let outside = |t: &&[u32; 3]| t.iter().all(|v| !far[*v as usize]);
+    let others = layout.triangles.iter().filter(outside).flat_map(sides);
+    let others = growth(&mut others.into_iter());
+    assert!((others - 1.3).abs() < 0.03, "{others}");
+}
+
+#[test]
+fn zones_have_their_own_ease() {
+    let (source, mut drape, triangles) = dressed();
+    let on_source = ClosestPoint::new(&source.mesh);
+    for x in &mut drape {
+        // 1 to 4 mm off the body: what touches it.
+        let foot = on_source.query(*x, f64::INFINITY).unwrap().point;
+        *x = foot + (*x - foot) * 0.2;
+    }
+    let target = moved(&source, |p| p * 1.5);
+    let mut layout = Layout::plain(drape.len(), triangles, Ease::Absolute);
+    for (ease, p) in layout.ease.iter_mut().zip(&drape) {
+        if p.z > 0.0 {
+            *ease = Ease::Relative.into();
+        }
+    }
+    let params = TransferParams::default();
+    let found = target_shape(&drape, &layout, &source, &target, &params).unwrap();
+    let growth = |chosen: &dyn Fn(f64) -> bool| {
+        let of_one = |v: usize| [on_source.signed_distance(drape[v]), found.clearance[v]];
+        let chosen = (0..drape.len()).filter(|v| chosen(drape[*v].z));
+        let [before, after] = chosen
+            .map(of_one)
+            .fold([0.0; 2], |[a, b], [c, d]| [a + c, b + d]);
+        after / before
+    };
+    // Away from where the zones meet; slopes carry up to a quarter of the other zone's change over.
+    let (front, back) = (growth(&|z| z > 0.2), growth(&|z| z < -0.2));
+    assert!((front - 1.5).abs() < 0.125, "{front}");
+    assert!((back - 1.0).abs() < 0.125, "{back}");
+}
+
+#[test]
+fn a_pocket_stays_over_what_it_lies_on() {
+    let (source, mut drape, mut triangles) = dressed();
+    let shell = drape.len() as u32;
+    let pocket = cap(&drape, 0.2);
+    let inside = |t: &&[u32; 3]| t.iter().all(|v| pocket[*v as usize]);
+    let over: Vec<[u32; 3]> = triangles.iter().filter(inside).copied().collect();
+    let used: std::collections::BTreeSet<u32> = over.iter().flatten().copied().collect();
+    let number: std::collections::BTreeMap<u32, u32> =
+        (used.iter().zip(shell..)).map(|(v, n)| (*v, n)).collect();
+    // 4 mm above.
+    let above = |v: &u32| drape[*v as usize] * (1.0 + 4e-3 / drape[*v as usize].norm());
+    let above: Vec<Vec3> = used.iter().map(above).collect();
+    drape.extend(above);
+    triangles.extend(over.iter().map(|t| t.map(|v| number[&v])));
+    let through = |x: &[Vec3]| crate::geometry::intersections::within(x, &triangles);
+    assert!(through(&drape).is_empty());
+    let bulge = |p: Vec3| {
+        let near = (-(p - Vec3::z() * 0.5).norm_squared() / 0.01).exp();
+        p * 1.1 + p.normalize() * 0.05 * near
+    };
+    let target = moved(&source, bulge);
+    let params = TransferParams::default();
+    let found = carry(&drape, &triangles, &source, &target, &params).unwrap();
+    assert!(through(&found.x_star).is_empty());
+    for (under, over) in number {
+        let [under, over] = [under, over].map(|v| found.x_star[v as usize].norm());
+        assert!(over > under);
+    }
+}
