@@ -20,9 +20,11 @@ use crate::geometry::groups::Groups;
 const TOUCHING: (f64, f64) = (0.0024, 0.009);
 /// ℓ across, of cloth that does not touch, as share of the body's height.
 const LOOSE: f64 = 0.25;
-/// ℓ along, off the lines, as share of the body's height: 9 cm. Longer ones even cloth out more, and lose more of
-/// its place on the way there and back.
+/// ℓ along, off the lines, of cloth that touches, as share of the body's height: 9 cm. Longer ones even cloth out
+/// more, and lose more of its place on the way there and back.
 const DRIFT: f64 = 0.05;
+/// ℓ along of cloth that does not touch: 20 cm. Shorter ones push the folds of a skirt through each other.
+const SWING: f64 = 0.12;
 /// Rims this close, as share of the body's height, grip it if most of the rim does: waistbands, cuffs, collars.
 /// 1.5 cm.
 const GRIP: f64 = 0.009;
@@ -74,6 +76,7 @@ pub(super) fn firmness(
     let pairs = seams.iter().flat_map(|line| line.windows(2));
     let along_seams = along(bound, pairs.map(|pair| [pair[0], pair[1]]));
     let along_rims = along(bound, rims.sides.iter().copied());
+    let touching = touching(draped);
     let of_one = |v: usize| {
         let blend = |from: f64, to: f64, t: f64| from + (to - from) * t;
         let firmness =
@@ -82,10 +85,11 @@ pub(super) fn firmness(
         let part = if rim.is_some() { RIM } else { 1.0 };
         let line = rim.or(seam).unwrap_or_else(Vec3::zeros);
         let grip = blend(1.0, GRIPPING, rims.grips[v]);
+        let drift = blend(SWING, DRIFT, touching[v]);
         Firmness {
             touching: firmness(grip * params.spacing),
             loose: firmness(LOOSE),
-            along: firmness(grip * blend(DRIFT.max(params.place), params.place, rims.grips[v])),
+            along: firmness(grip * blend(drift.max(params.place), params.place, rims.grips[v])),
             line: across[v].cross(&line) * firmness(part * params.place).sqrt(),
         }
     };
