@@ -16,6 +16,7 @@ mod part;
 mod pull_back;
 mod rub;
 mod stretch;
+mod taped;
 mod turn;
 
 use super::cloth::{Cloth, GRAVITY, Rest};

@@ -154,8 +154,8 @@ impl Part {
                 || high.look(surface, contact, reach, b_high),
             );
         }
-        self.stretch.clear();
-        self.turn.clear();
+        self.stretch.taped.clear();
+        self.turn.taped.clear();
         self.creases.clear();
         self.holds.clear();
         self.contacts.look(surface, contact, reach, before);
@@ -168,8 +168,8 @@ impl Part {
             join(|| low.sweep(r_low, sweep), || high.sweep(r_high, sweep));
         }
         let Sweep { first, record } = sweep;
-        self.stretch.sweep(rows, first, record);
-        self.turn.sweep(rows, first, record);
+        self.stretch.taped.sweep(rows, first, record);
+        self.turn.taped.sweep(rows, first, record);
         self.creases.sweep(rows, first, record);
         self.holds.sweep(rows, first, record);
     }
@@ -179,8 +179,8 @@ impl Part {
     pub(super) fn pull_back(&mut self, rows: &mut [Four], hats: &mut [Four], last: bool) {
         self.holds.pull_back(rows, hats, last);
         self.creases.pull_back(rows, hats, last);
-        self.turn.pull_back(rows, hats, last);
-        self.stretch.pull_back(rows, hats, last);
+        self.turn.taped.pull_back(rows, hats, last);
+        self.stretch.taped.pull_back(rows, hats, last);
         if let Some([low, high]) = self.halves.as_deref_mut() {
             let (r_low, r_high) = rows.split_at_mut(low.len);
             let (h_low, h_high) = hats.split_at_mut(low.len);

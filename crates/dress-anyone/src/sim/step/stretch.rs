@@ -12,29 +12,26 @@
 mod back;
 
 use super::lanes::{
-    Elements, Four, Four3, LANES, Lane, Lane3, Walk, blocks, difference, dot, gather, parts,
-    scaled, scatter, sum, walk,
+    Elements, Four, Four3, LANES, Lane, Lane3, blocks, difference, dot, gather, scaled, scatter,
+    sum,
 };
 use super::pull_back::RestHat;
+use super::taped::{Taped, Visit};
 use crate::geometry::Mat2;
 use crate::sim::cloth::{Cloth, Rest};
 use crate::sim::energy::membrane::Elasticity;
-use back::{Hat, PullBack};
 use pulp::Simd;
 
 /// Triangles of a part of a cloth, with one rest shape.
 #[derive(Default)]
 pub(super) struct Stretch {
-    blocks: Vec<Block>,
+    pub(super) taped: Taped<Block>,
     pub(super) triangles: Vec<Elements>,
-    /// Δλ of every visit that was recorded; 0 where its system could not be solved.
-    tape: Vec<Four3>,
-    hats: Vec<Hat>,
 }
 
 /// [`LANES`] triangles of one material that share no vertex.
 #[derive(Clone, Debug, Default)]
-struct Block {
+pub(super) struct Block {
     corners: [[u32; LANES]; 3],
     /// Compliance 𝔻⁻¹ Δt⁻² per rest area: weft, coupling, warp, shear.
     compliance: [f64; 4],
@@ -66,15 +63,14 @@ impl Stretch {
             }
         };
         Self {
-            blocks: triangles.iter().map(block).collect(),
+            taped: Taped::new(triangles.iter().map(block).collect()),
             triangles,
-            ..Self::default()
         }
     }
 
     /// Takes on a rest shape.
     pub(super) fn grow(&mut self, rest: &Rest) {
-        for (block, elements) in self.blocks.iter_mut().zip(&self.triangles) {
+        for (block, elements) in self.taped.blocks.iter_mut().zip(&self.triangles) {
             // Lanes left over have no b: nothing moves.
             let per_area = |e: u32| 1.0 / rest.triangles[e as usize].area;
             block.per_area = Four(elements.map(per_area));
@@ -87,41 +83,9 @@ impl Stretch {
         }
     }
 
-    /// Forgets what was recorded.
-    pub(super) fn clear(&mut self) {
-        self.tape.clear();
-    }
-
-    /// Visits every triangle once. The `first` sweep of a step begins with λ = 0.
-    pub(super) fn sweep(&mut self, rows: &mut [Four], first: bool, record: bool) {
-        let Self { blocks, tape, .. } = self;
-        let tape = record.then_some(tape);
-        walk(Sweep {
-            blocks,
-            rows,
-            first,
-            tape,
-        });
-    }
-
-    /// Walks back through the last sweep that was recorded: undoes it on `rows`, and hands the gradients
-    /// `hats` by what it wrote on to what it read. The `last` sweep of a step leaves λ to nobody.
-    pub(super) fn pull_back(&mut self, rows: &mut [Four], hats: &mut [Four], last: bool) {
-        let visits = self.tape.split_off(self.tape.len() - self.blocks.len());
-        self.hats.resize_with(self.blocks.len(), Hat::default);
-        walk(PullBack {
-            blocks: &mut self.blocks,
-            own: &mut self.hats,
-            visits: &visits,
-            rows,
-            hats,
-            last,
-        });
-    }
-
     /// Adds the gradients by the rest shape to `all`, and forgets them.
     pub(super) fn hand_over(&mut self, all: &mut RestHat) {
-        for (hat, elements) in self.hats.drain(..).zip(&self.triangles) {
+        for (hat, elements) in self.taped.hats.drain(..).zip(&self.triangles) {
             for (l, e) in elements.each() {
                 let [a, b, c, d] = hat.b.map(|lanes| lanes.0[l]);
                 all.inverse[e] += Mat2::new(a, b, c, d);
@@ -141,28 +105,6 @@ fn compliance(d: &Elasticity, dt: f64) -> [f64; 4] {
         1.0 / d.shear,
     ];
     entries.map(|c| c / (dt * dt))
-}
-
-struct Sweep<'a> {
-    blocks: &'a mut [Block],
-    rows: &'a mut [Four],
-    first: bool,
-    tape: Option<&'a mut Vec<Four3>>,
-}
-
-impl Walk for Sweep<'_> {
-    #[inline(always)]
-    fn walk<S: Simd>(mut self, simd: S) {
-        for block in self.blocks {
-            let mut visit = Four3::default();
-            for part in 0..parts::<S>() {
-                block.visit(simd, part, self.rows, self.first, &mut visit);
-            }
-            if let Some(tape) = &mut self.tape {
-                tape.push(visit);
-            }
-        }
-    }
 }
 
 /// A symmetric matrix of each triangle: 00, 10, 11.
@@ -301,7 +243,9 @@ impl Block {
             ],
         }
     }
+}
 
+impl Visit for Block {
     #[inline(always)]
     fn visit<S: Simd>(
         &mut self,

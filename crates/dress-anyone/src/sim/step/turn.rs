@@ -9,27 +9,24 @@
 )]
 
 use super::lanes::{
-    Elements, Four, Four3, LANES, Lane, Walk, blocks, difference, dot, gather, parts, scaled,
-    scatter, sum, walk,
+    Elements, Four, Four3, LANES, Lane, blocks, difference, dot, gather, scaled, scatter, sum,
 };
 use super::pull_back::RestHat;
+use super::taped::{Taped, Undo, Visit};
 use crate::sim::cloth::{Cloth, Rest};
 use pulp::Simd;
 
 /// Hinges of a part of a cloth, with one rest shape.
 #[derive(Default)]
 pub(super) struct Turn {
-    blocks: Vec<Block>,
+    pub(super) taped: Taped<Block>,
     pub(super) hinges: Vec<Elements>,
-    /// Δλ of every visit that was recorded.
-    tape: Vec<Four3>,
-    hats: Vec<Hat>,
     dt: f64,
 }
 
 /// [`LANES`] hinges that share no vertex.
 #[derive(Clone, Debug, Default)]
-struct Block {
+pub(super) struct Block {
     vertices: [[u32; LANES]; 4],
     k: [Four; 4],
     alpha_tilde: Four,
@@ -40,7 +37,7 @@ struct Block {
 
 /// Gradients by what a block has.
 #[derive(Clone, Debug, Default)]
-struct Hat {
+pub(super) struct Hat {
     k: [Four; 4],
     alpha_tilde: Four,
     lambda: Four3,
@@ -65,16 +62,15 @@ impl Turn {
             }
         };
         Self {
-            blocks: hinges.iter().map(block).collect(),
+            taped: Taped::new(hinges.iter().map(block).collect()),
             hinges,
             dt,
-            ..Self::default()
         }
     }
 
     /// Takes on a rest shape; `w` are inverse masses \[1/kg\], `[place in the part]`.
     pub(super) fn grow(&mut self, rest: &Rest, w: impl Fn(u32) -> f64) {
-        for (block, elements) in self.blocks.iter_mut().zip(&self.hinges) {
+        for (block, elements) in self.taped.blocks.iter_mut().zip(&self.hinges) {
             let alpha_tilde = |e: u32| {
                 let stiffness = rest.hinges[e as usize].stiffness;
                 1.0 / (stiffness * self.dt * self.dt)
@@ -94,41 +90,9 @@ impl Turn {
         }
     }
 
-    /// Forgets what was recorded.
-    pub(super) fn clear(&mut self) {
-        self.tape.clear();
-    }
-
-    /// Visits every hinge once. The `first` sweep of a step begins with λ = 0.
-    pub(super) fn sweep(&mut self, rows: &mut [Four], first: bool, record: bool) {
-        let Self { blocks, tape, .. } = self;
-        let tape = record.then_some(tape);
-        walk(Sweep {
-            blocks,
-            rows,
-            first,
-            tape,
-        });
-    }
-
-    /// Walks back through the last sweep that was recorded: undoes it on `rows`, and hands the gradients
-    /// `hats` by what it wrote on to what it read. The `last` sweep of a step leaves λ to nobody.
-    pub(super) fn pull_back(&mut self, rows: &mut [Four], hats: &mut [Four], last: bool) {
-        let visits = self.tape.split_off(self.tape.len() - self.blocks.len());
-        self.hats.resize_with(self.blocks.len(), Hat::default);
-        walk(PullBack {
-            blocks: &mut self.blocks,
-            own: &mut self.hats,
-            visits: &visits,
-            rows,
-            hats,
-            last,
-        });
-    }
-
     /// Adds the gradients by the rest shape to `all`, and forgets them.
     pub(super) fn hand_over(&mut self, rest: &Rest, all: &mut RestHat) {
-        let blocks = self.blocks.iter().zip(self.hats.drain(..));
+        let blocks = self.taped.blocks.iter().zip(self.taped.hats.drain(..));
         for ((block, hat), elements) in blocks.zip(&self.hinges) {
             for (l, e) in elements.each() {
                 let vertices = block.vertices.map(|v| v[l]);
@@ -160,50 +124,7 @@ fn merged(vertices: [u32; 4], k: [f64; 4]) -> [f64; 4] {
     merged
 }
 
-struct Sweep<'a> {
-    blocks: &'a mut [Block],
-    rows: &'a mut [Four],
-    first: bool,
-    tape: Option<&'a mut Vec<Four3>>,
-}
-
-impl Walk for Sweep<'_> {
-    #[inline(always)]
-    fn walk<S: Simd>(mut self, simd: S) {
-        for block in self.blocks {
-            let mut visit = Four3::default();
-            for part in 0..parts::<S>() {
-                block.visit(simd, part, self.rows, self.first, &mut visit);
-            }
-            if let Some(tape) = &mut self.tape {
-                tape.push(visit);
-            }
-        }
-    }
-}
-
-struct PullBack<'a> {
-    blocks: &'a mut [Block],
-    own: &'a mut [Hat],
-    visits: &'a [Four3],
-    rows: &'a mut [Four],
-    hats: &'a mut [Four],
-    last: bool,
-}
-
-impl Walk for PullBack<'_> {
-    #[inline(always)]
-    fn walk<S: Simd>(self, simd: S) {
-        let blocks = self.blocks.iter_mut().zip(self.own).zip(self.visits);
-        for ((block, hat), visit) in blocks.rev() {
-            for part in 0..parts::<S>() {
-                block.pull_back(simd, part, visit, hat, self.rows, self.hats, self.last);
-            }
-        }
-    }
-}
-
-impl Block {
+impl Visit for Block {
     #[inline(always)]
     fn visit<S: Simd>(
         &mut self,
@@ -248,10 +169,13 @@ impl Block {
             scatter(rows, &self.vertices[corner], part, (p, w));
         }
     }
+}
 
-    #[expect(clippy::too_many_arguments, reason = "what a visit reads and writes")]
+impl Undo for Block {
+    type Hat = Hat;
+
     #[inline(always)]
-    fn pull_back<S: Simd>(
+    fn undo<S: Simd>(
         &mut self,
         simd: S,
         part: usize,
@@ -343,7 +267,7 @@ mod tests {
         turn.grow(&rest, |v| w[v as usize]);
         let mut lambda = vec![Vec3::zeros(); all.len()];
         for sweep in 0..3 {
-            turn.sweep(&mut rows, sweep == 0, true);
+            turn.taped.sweep(&mut rows, sweep == 0, true);
             for (_, e) in turn.hinges.iter().flat_map(Elements::each) {
                 let (hinge, vertices) = (&rest.hinges[e], cloth.hinges[e].vertices);
                 let alpha_tilde = 1.0 / (hinge.stiffness * dt * dt);
@@ -361,11 +285,11 @@ mod tests {
                 }
             }
         }
-        assert_eq!(turn.tape.len(), 3 * turn.blocks.len());
+        assert_eq!(turn.taped.tape.len(), 3 * turn.taped.blocks.len());
         for (row, x) in rows.iter().zip(&x) {
             assert!((row.vector() - x).norm() < 1e-12, "{row:?} {x:?}");
         }
-        for (block, elements) in turn.blocks.iter().zip(&turn.hinges) {
+        for (block, elements) in turn.taped.blocks.iter().zip(&turn.hinges) {
             for (l, e) in elements.each() {
                 let off = of_lane(&block.lambda, l) - lambda[e];
                 assert!(off.norm() < 1e-9 * lambda[e].norm().max(1e-9));

@@ -10,13 +10,14 @@
 
 use super::{Block, Loaded, System, along, complied, masses, metric, times};
 use crate::sim::step::lanes::{
-    Four, Four3, Lane, Lane3, Walk, difference, dot, gather, parts, scaled, scatter, sum,
+    Four, Four3, Lane, Lane3, difference, dot, gather, scaled, scatter, sum,
 };
+use crate::sim::step::taped::Undo;
 use pulp::Simd;
 
 /// Gradients by what a block has.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Hat {
+pub(in crate::sim::step) struct Hat {
     /// By b of corners 1 and 2.
     pub(super) b: [Four; 4],
     /// By Ā.
@@ -24,35 +25,11 @@ pub(super) struct Hat {
     lambda: Four3,
 }
 
-/// The walk back through one sweep.
-pub(super) struct PullBack<'a> {
-    pub(super) blocks: &'a mut [Block],
-    /// Gradients by what each has.
-    pub(super) own: &'a mut [Hat],
-    pub(super) visits: &'a [Four3],
-    pub(super) rows: &'a mut [Four],
-    /// Gradients by the rows.
-    pub(super) hats: &'a mut [Four],
-    /// Whether it was the last of its step.
-    pub(super) last: bool,
-}
+impl Undo for Block {
+    type Hat = Hat;
 
-impl Walk for PullBack<'_> {
     #[inline(always)]
-    fn walk<S: Simd>(self, simd: S) {
-        let blocks = self.blocks.iter_mut().zip(self.own).zip(self.visits);
-        for ((block, hat), visit) in blocks.rev() {
-            for part in 0..parts::<S>() {
-                block.pull_back(simd, part, visit, hat, self.rows, self.hats, self.last);
-            }
-        }
-    }
-}
-
-impl Block {
-    #[expect(clippy::too_many_arguments, reason = "what a visit reads and writes")]
-    #[inline(always)]
-    fn pull_back<S: Simd>(
+    fn undo<S: Simd>(
         &mut self,
         simd: S,
         part: usize,

@@ -1,9 +1,12 @@
+use super::back::Hat;
 use super::*;
 use crate::check::noise;
 use crate::geometry::{Mat3, Vec3};
 use crate::sim::cloth::fixtures::{patched, tube};
 use crate::sim::energy::membrane::{constraint, constraint_gradient, constraint_mass};
+use crate::sim::step::lanes::Walk;
 use crate::sim::step::lanes::{of_lane, row};
+use crate::sim::step::taped::{PullBack, Sweep};
 
 /// The visit as the energy's file defines it.
 fn scalar(
@@ -49,17 +52,17 @@ fn lanes_do_what_the_constraint_says() {
     stretch.grow(&rest);
     let mut lambda = vec![Vec3::zeros(); all.len()];
     for sweep in 0..3 {
-        stretch.sweep(&mut rows, sweep == 0, true);
+        stretch.taped.sweep(&mut rows, sweep == 0, true);
         for (_, e) in stretch.triangles.iter().flat_map(Elements::each) {
             scalar(&cloth, &rest, &w, e, &mut lambda[e], &mut x, dt);
         }
     }
-    assert_eq!(stretch.tape.len(), 3 * stretch.blocks.len());
+    assert_eq!(stretch.taped.tape.len(), 3 * stretch.taped.blocks.len());
     for (row, x) in rows.iter().zip(&x) {
         // Decimetres, by other roundings over three sweeps of violent moves.
         assert!((row.vector() - x).norm() < 1e-11, "{row:?} {x:?}");
     }
-    for (block, elements) in stretch.blocks.iter().zip(&stretch.triangles) {
+    for (block, elements) in stretch.taped.blocks.iter().zip(&stretch.triangles) {
         for (l, e) in elements.each() {
             let off = of_lane(&block.lambda, l) - lambda[e];
             assert!(off.norm() < 1e-9 * lambda[e].norm().max(1e-6));
@@ -86,28 +89,31 @@ fn wide_registers_change_no_bit() {
         let mut hats = rows.clone();
         let mut stretch = Stretch::new(&cloth, &all, |v| v, count, 0.01);
         stretch.grow(&rest);
-        stretch.hats.resize_with(stretch.blocks.len(), Hat::default);
+        stretch
+            .taped
+            .hats
+            .resize_with(stretch.taped.blocks.len(), Hat::default);
         if narrow {
             let scalar = pulp::Scalar::new();
             let sweep = Sweep {
-                blocks: &mut stretch.blocks,
+                blocks: &mut stretch.taped.blocks,
                 rows: &mut rows,
                 first: true,
-                tape: Some(&mut stretch.tape),
+                tape: Some(&mut stretch.taped.tape),
             };
             sweep.walk(scalar);
             let back = PullBack {
-                blocks: &mut stretch.blocks,
-                own: &mut stretch.hats,
-                visits: &stretch.tape,
+                blocks: &mut stretch.taped.blocks,
+                own: &mut stretch.taped.hats,
+                visits: &stretch.taped.tape,
                 rows: &mut rows,
                 hats: &mut hats,
                 last: true,
             };
             back.walk(scalar);
         } else {
-            stretch.sweep(&mut rows, true, true);
-            stretch.pull_back(&mut rows, &mut hats, true);
+            stretch.taped.sweep(&mut rows, true, true);
+            stretch.taped.pull_back(&mut rows, &mut hats, true);
         }
         (rows, hats)
     };
