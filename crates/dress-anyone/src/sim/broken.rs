@@ -1,7 +1,9 @@
-//! Where a drape broke down: positions or forces that are no numbers any more, and the likely cause.
+//! Where a drape, or the walk back through it, broke down: positions, forces or gradients that are no
+//! numbers any more, and the likely cause.
 //!
 //! Once there is one such position, the next sweep or solve spreads it over the cloth. So the cloth is
-//! kept as it was before, and the triangle told is the one that was stretched most then.
+//! kept as it was before, and the triangle told is the one that was stretched most then; of gradients,
+//! the one at whose corners they were largest.
 
 use super::cloth::{Cloth, Rest};
 use crate::geometry::{Vec2, Vec3};
@@ -13,10 +15,11 @@ use std::ops::Range;
 pub struct Broken {
     /// What was going on.
     pub stage: Stage,
-    /// The triangle of cloth that was stretched most.
+    /// The triangle of cloth that was stretched most, or whose gradient was largest.
     pub triangle: usize,
-    /// How many times its length it was stretched \[–\]; infinite if its own corners are no numbers.
-    pub stretch: f64,
+    /// How many times its length it was stretched \[–\], or the norm of the gradient by its corners;
+    /// infinite if these are no numbers themselves.
+    pub most: f64,
 }
 
 /// What was going on.
@@ -26,30 +29,35 @@ pub enum Stage {
     Step(usize),
     /// The static solve, after this many iterations.
     Iteration(usize),
+    /// The walk back through this step.
+    StepBack(usize),
 }
 
 impl Broken {
     /// Looks at the last good positions `x` \[m\]; none for cloth without triangles.
     pub(super) fn at(stage: Stage, cloth: &Cloth, rest: &Rest, x: &[Vec3]) -> Option<Self> {
-        let stretches = cloth
-            .triangles
-            .iter()
-            .zip(&rest.triangles)
-            .map(|(t, rest)| {
-                let stretch = rest.gradient_of(t.map(|v| x[v as usize])).norm();
-                if stretch.is_finite() {
-                    stretch
-                } else {
-                    f64::INFINITY
-                }
-            });
-        let most = stretches
-            .enumerate()
-            .reduce(|most, next| if next.1 > most.1 { next } else { most });
-        most.map(|(triangle, stretch)| Self {
+        let triangles = cloth.triangles.iter().zip(&rest.triangles);
+        let stretches =
+            triangles.map(|(t, rest)| rest.gradient_of(t.map(|v| x[v as usize])).norm());
+        Self::most(stage, stretches)
+    }
+
+    /// Looks at the last good gradient by positions; none for cloth without triangles.
+    pub(super) fn back_at(step: usize, cloth: &Cloth, x_hat: &[Vec3]) -> Option<Self> {
+        let of = |t: &[u32; 3]| t.map(|v| x_hat[v as usize].norm_squared());
+        let sizes = (cloth.triangles.iter()).map(|t| of(t).iter().sum::<f64>().sqrt());
+        Self::most(Stage::StepBack(step), sizes)
+    }
+
+    /// The triangle of which `each` is largest.
+    fn most(stage: Stage, each: impl Iterator<Item = f64>) -> Option<Self> {
+        let finite = |m: f64| if m.is_finite() { m } else { f64::INFINITY };
+        let all = each.map(finite).enumerate();
+        let most = all.reduce(|most, next| if next.1 > most.1 { next } else { most });
+        most.map(|(triangle, most)| Self {
             stage,
             triangle,
-            stretch,
+            most,
         })
     }
 
@@ -58,6 +66,11 @@ impl Broken {
         let when = match self.stage {
             Stage::Step(step) => format!("in step {step} of bringing the panels together"),
             Stage::Iteration(iteration) => format!("in iteration {iteration} of the static solve"),
+            Stage::StepBack(step) => format!("walking back through step {step}"),
+        };
+        let what = match self.stage {
+            Stage::StepBack(_) => format!("the gradient was largest ({:.1e})", self.most),
+            _ => format!("the cloth was stretched most ({:.1e} times)", self.most),
         };
         let holds = |triangles: &Range<usize>| triangles.contains(&self.triangle);
         let panel = mesh.panel_triangles.iter().position(holds);
@@ -65,9 +78,8 @@ impl Broken {
         let corners = mesh.triangles[self.triangle].map(|v| mesh.x_bar[v as usize]);
         let middle = corners.iter().sum::<Vec2>() * (100.0 / 3.0);
         format!(
-            "{when}; the cloth was stretched most ({:.1e} times) in panel `{name}`, triangle {}, at \
-             ({:.1}, {:.1}) cm of the pattern",
-            self.stretch, self.triangle, middle.x, middle.y
+            "{when}; {what} in panel `{name}`, triangle {}, at ({:.1}, {:.1}) cm of the pattern",
+            self.triangle, middle.x, middle.y
         )
     }
 }

@@ -69,6 +69,11 @@ impl StepParams {
     pub fn steps(&self) -> usize {
         (self.time / self.dt).ceil() as usize
     }
+
+    /// τ/Δt \[1/s\]: velocity kept per move.
+    pub(super) fn kept(&self) -> f64 {
+        (-self.drag * self.dt).exp() / self.dt
+    }
 }
 
 /// Positions and velocities.
@@ -217,7 +222,7 @@ impl<'a, S: Surface> Stepper<'a, S> {
         let before = std::mem::replace(&mut state.x, moved);
         self.watch.restrain(&before, &mut state.x);
         for ((x, v), start) in state.x.iter().zip(&mut state.v).zip(&before) {
-            *v = (x - start) * self.kept();
+            *v = (x - start) * self.params.kept();
         }
     }
 
@@ -233,10 +238,5 @@ impl<'a, S: Surface> Stepper<'a, S> {
             self.whole.sweep_contacts(rows, record);
         }
         self.whole.rub(before, rows);
-    }
-
-    /// τ/Δt \[1/s\]: velocity kept per move.
-    fn kept(&self) -> f64 {
-        (-self.params.drag * self.params.dt).exp() / self.params.dt
     }
 }

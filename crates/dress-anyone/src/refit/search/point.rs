@@ -198,7 +198,7 @@ impl<'s, S: Surface> Search<'s, S> {
         let found = Trajectory::run(self.scene, x_bar, start, steps, &mut |p| run.drapes(p));
         let found = found.ok_or(failed(RestStatus::Stopped, f64::NAN))?;
         let residual = found.residual();
-        if !residual.is_finite() {
+        if found.broken().is_some() || !residual.is_finite() {
             return Err(failed(RestStatus::NotFinite, residual));
         }
         Ok(End::Path(Box::new(found)))

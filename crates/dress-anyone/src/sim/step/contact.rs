@@ -53,6 +53,8 @@ pub(super) struct Block<const N: usize> {
     pub(super) mu: Four,
     /// ∂c/∂p: of length one but for the smoothing of the distance; 0 where nothing is near.
     pub(super) normal: Four3,
+    /// By how much ∇d was lengthened for it: more than 1 in creases.
+    raised: Four,
     /// c = normal·x − offset.
     offset: Four,
     /// 1/(W |∇d|² + α̃).
@@ -71,13 +73,15 @@ pub(super) struct Hat {
 /// Slope of the distance below which it is that of a crease deep in the body \[–\].
 const CREASE: f64 = 0.5;
 
-/// The gradient of the distance as the contact takes it: as it is, so that the rest state is that of
-/// the energy; made a unit vector in creases, where it fades; none where there is no direction.
-fn slope(gradient: Vec3) -> Option<Vec3> {
-    if gradient.norm() > CREASE {
-        Some(gradient)
+/// The gradient of the distance as the contact takes it, and by how much it was lengthened: as it
+/// is, so that the rest state is that of the energy; made a unit vector in creases, where it fades; none
+/// where there is no direction.
+fn slope(gradient: Vec3) -> Option<(Vec3, f64)> {
+    let length = gradient.norm();
+    if length > CREASE {
+        Some((gradient, 1.0))
     } else {
-        gradient.try_normalize(1e-3)
+        Some((gradient.try_normalize(1e-3)?, 1.0 / length))
     }
 }
 
@@ -185,6 +189,7 @@ impl<const N: usize> Points<N> {
                 alpha_tilde: Four(elements.map(alpha_tilde)),
                 mu: Four(elements.map(mu)),
                 normal: Four3::default(),
+                raised: Four::default(),
                 offset: Four::default(),
                 per_mass: Four::default(),
                 lambda: Four::default(),
@@ -206,15 +211,15 @@ impl<const N: usize> Points<N> {
                 let p = block.point(l, rows);
                 let found = surface.distance_below(p, reach);
                 planes[l] = found.and_then(|(d, gradient)| {
-                    let normal = slope(gradient)?;
-                    Some((normal, normal.dot(&p) - (d - params.thickness)))
+                    let (normal, raised) = slope(gradient)?;
+                    Some((normal, raised, normal.dot(&p) - (d - params.thickness)))
                 });
             }
             if planes.iter().any(Option::is_some) {
                 for (l, plane) in planes.into_iter().enumerate() {
                     // What is nowhere near, and lanes left over, never push: c = 1.
-                    let (normal, offset) = plane.unwrap_or((Vec3::zeros(), -1.0));
-                    block.set(l, normal, offset, rows);
+                    let nowhere = (Vec3::zeros(), 1.0, -1.0);
+                    block.set(l, plane.unwrap_or(nowhere), rows);
                 }
                 self.near.push(i);
             }
@@ -256,18 +261,14 @@ impl<const N: usize> Points<N> {
                     continue;
                 }
                 let p = block.point(l, before);
-                let Some((_, gradient)) = surface.distance(p) else {
-                    continue;
-                };
-                let normal = of_lane(&block.normal, l);
+                let (normal, raised) = (of_lane(&block.normal, l), block.raised.0[l]);
                 let n_hat = n_hat + p * offset_hat;
-                let length = gradient.norm();
-                let by_gradient = if length > CREASE {
-                    n_hat
-                } else {
-                    (n_hat - normal * normal.dot(&n_hat)) / length
-                };
-                let p_hat = (normal - gradient) * offset_hat + surface.curvature(p) * by_gradient;
+                let (mut by_gradient, mut p_hat) = (n_hat, Vec3::zeros());
+                if raised > 1.0 {
+                    by_gradient = (n_hat - normal * normal.dot(&n_hat)) * raised;
+                    p_hat = normal * (offset_hat * (1.0 - 1.0 / raised));
+                }
+                p_hat += surface.curvature(p) * by_gradient;
                 for (a, share) in block.corners_of(l) {
                     before_hat[a].shift(p_hat * share);
                 }
@@ -294,7 +295,8 @@ impl<const N: usize> Block<N> {
         corners.map(|(a, share)| share * share * rows[a].0[3]).sum()
     }
 
-    fn set(&mut self, l: usize, normal: Vec3, offset: f64, rows: &[Four]) {
+    fn set(&mut self, l: usize, (normal, raised, offset): (Vec3, f64, f64), rows: &[Four]) {
+        self.raised.0[l] = raised;
         for (lanes, n) in self.normal.iter_mut().zip(normal.iter()) {
             lanes.0[l] = *n;
         }

@@ -37,7 +37,7 @@ impl<S: Surface> Stepper<'_, S> {
         let farthest = self.params.speed * self.params.dt;
         let mut hats = Vec::with_capacity(count);
         for (place, v) in self.order.iter().map(|v| *v as usize).enumerate() {
-            let by_move = hat.v[v] * self.kept();
+            let by_move = hat.v[v] * self.params.kept();
             let x_hat = hat.x[v] + by_move;
             let moved = self.rows[place].vector() - self.before[place].vector();
             let length = moved.norm();
@@ -50,14 +50,8 @@ impl<S: Surface> Stepper<'_, S> {
             before_hat[place] = row(x_hat - kept - by_move, 0.0);
             hats.push(row(kept, 0.0));
         }
-        let (before, rows) = (&self.before, &mut self.rows);
-        (self.whole).pull_back_rub(before, rows, &mut hats, &mut before_hat);
-        for sweep in (0..self.params.sweeps).rev() {
-            let last = sweep + 1 == self.params.sweeps;
-            self.whole.pull_back_contacts(rows, &mut hats);
-            self.whole.pull_back(rows, &mut hats, last);
-        }
-        (self.whole).pull_back_look(self.surface, before, &mut before_hat);
+        // One entry into the pool of threads serves all sweeps.
+        rayon::scope(|_| self.sweep_back(&mut hats, &mut before_hat));
         self.w_hat.resize(count, 0.0);
         for (place, v) in self.order.iter().map(|v| *v as usize).enumerate() {
             let by_wish = hats[place].vector();
@@ -65,6 +59,18 @@ impl<S: Surface> Stepper<'_, S> {
             hat.x[v] = by_wish + before_hat[place].vector();
             self.w_hat[v] += hats[place].0[3];
         }
+    }
+
+    /// Walks back through friction and all sweeps.
+    fn sweep_back(&mut self, hats: &mut [Four], before_hat: &mut [Four]) {
+        let (before, rows) = (&self.before, &mut self.rows);
+        self.whole.pull_back_rub(before, rows, hats, before_hat);
+        for sweep in (0..self.params.sweeps).rev() {
+            let last = sweep + 1 == self.params.sweeps;
+            self.whole.pull_back_contacts(rows, hats);
+            self.whole.pull_back(rows, hats, last);
+        }
+        self.whole.pull_back_look(self.surface, before, before_hat);
     }
 
     /// The gradient by the rest shape `x_bar` \[m\] of all steps walked back through since it was last

@@ -79,16 +79,17 @@ impl<B: Visit + Undo> Taped<B> {
     /// Walks back through the last sweep that was recorded: undoes it on `rows`, and hands the gradients
     /// `hats` by what it wrote on to what it read. The `last` sweep of a step leaves λ to nobody.
     pub(super) fn pull_back(&mut self, rows: &mut [Four], hats: &mut [Four], last: bool) {
-        let visits = self.tape.split_off(self.tape.len() - self.blocks.len());
         self.hats.resize_with(self.blocks.len(), B::Hat::default);
+        let first = self.tape.len() - self.blocks.len();
         walk(PullBack {
             blocks: &mut self.blocks,
             own: &mut self.hats,
-            visits: &visits,
+            visits: &self.tape[first..],
             rows,
             hats,
             last,
         });
+        self.tape.truncate(first);
     }
 }
 

@@ -38,8 +38,10 @@ pub(super) struct Block {
 /// Gradients by what a block has.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Hat {
-    k: [Four; 4],
-    alpha_tilde: Four,
+    /// By k of corners 1 to 3. Only what all of k adds up to, 0, is lost if corner 0 has none.
+    k: [Four; 3],
+    /// α̃ times that by α̃.
+    by_alpha: Four,
     lambda: Four3,
 }
 
@@ -97,12 +99,12 @@ impl Turn {
             for (l, e) in elements.each() {
                 let vertices = block.vertices.map(|v| v[l]);
                 for corner in 0..4 {
-                    let from = first_of(vertices, corner);
-                    all.k[e][corner] += hat.k[from].0[l];
+                    if let Some(from) = first_of(vertices, corner).checked_sub(1) {
+                        all.k[e][corner] += hat.k[from].0[l];
+                    }
                 }
                 // α̃ = Δt⁻²/stiffness.
-                let by_alpha = hat.alpha_tilde.0[l] * block.alpha_tilde.0[l];
-                all.stiffness[e] -= by_alpha / rest.hinges[e].stiffness;
+                all.stiffness[e] -= hat.by_alpha.0[l] / rest.hinges[e].stiffness;
             }
         }
     }
@@ -191,52 +193,61 @@ impl Undo for Block {
             Lane::load(simd, &self.k[2], part),
             Lane::load(simd, &self.k[3], part),
         ];
-        let at = [
+        let mut at = [
             gather(simd, rows, &self.vertices[0], part),
             gather(simd, rows, &self.vertices[1], part),
             gather(simd, rows, &self.vertices[2], part),
             gather(simd, rows, &self.vertices[3], part),
         ];
-        let at_hat = [
+        let mut at_hat = [
             gather(simd, hats, &self.vertices[0], part),
             gather(simd, hats, &self.vertices[1], part),
             gather(simd, hats, &self.vertices[2], part),
             gather(simd, hats, &self.vertices[3], part),
         ];
         let delta = Lane::load3(simd, visit, part);
-        let lambda = Lane::load3(simd, &self.lambda, part);
-        let mut delta_hat = if last {
+        let lambda_hat = if last {
             [Lane::all(simd, 0.0); 3]
         } else {
             Lane::load3(simd, &hat.lambda, part)
         };
-        let lambda_hat = delta_hat;
+        let mut delta_hat = lambda_hat;
         for corner in 0..4 {
             let by = at[corner].1 * k[corner];
             delta_hat = sum(delta_hat, scaled(at_hat[corner].0, by));
         }
         let right_hat = scaled(delta_hat, Lane::load(simd, &self.per_mass, part));
-        // Both from the mass and from the right side.
-        let by_mass = -dot(right_hat, delta);
-        (-dot(right_hat, lambda)).add_to(&mut hat.alpha_tilde, part);
         let alpha_tilde = Lane::load(simd, &self.alpha_tilde, part);
         let answered = difference(lambda_hat, scaled(right_hat, alpha_tilde));
         for c in 0..3 {
             answered[c].store(&mut hat.lambda[c], part);
-            (lambda[c] - delta[c]).store(&mut self.lambda[c], part);
         }
+        // Both from the mass and from the right side.
+        let by_mass = -dot(right_hat, delta);
+        // The visit left c = −α̃λ.
+        let mut by_alpha = Lane::all(simd, 0.0);
+        let mut by_first = by_alpha;
+        for corner in 0..4 {
+            let ((p, w), (p_hat, w_hat), k) = (at[corner], at_hat[corner], k[corner]);
+            let turned = dot(right_hat, p);
+            by_alpha = by_alpha + k * turned;
+            let lost = dot(delta, p_hat) + by_mass * k;
+            let by_k = w * lost - turned;
+            if corner == 0 {
+                by_first = by_k;
+            } else {
+                (by_k - by_first).add_to(&mut hat.k[corner - 1], part);
+            }
+            let p_hat = difference(p_hat, scaled(right_hat, k));
+            at[corner] = (difference(p, scaled(delta, w * k)), w);
+            at_hat[corner] = (p_hat, w_hat + k * lost);
+        }
+        by_alpha.add_to(&mut hat.by_alpha, part);
+        // Backwards: what the first corner at a vertex stores is what stays.
         for corner in 0..4 {
             let corner = 3 - corner;
-            let ((p, w), (p_hat, w_hat), k) = (at[corner], at_hat[corner], k[corner]);
-            let along = dot(delta, p_hat);
-            let by_k = by_mass * k;
-            let w_hat = w_hat + k * (along + by_k);
-            let p = difference(p, scaled(delta, w * k));
-            let by_k = w * (along + (by_k + by_k)) - dot(right_hat, p);
-            by_k.add_to(&mut hat.k[corner], part);
-            let p_hat = difference(p_hat, scaled(right_hat, k));
-            scatter(rows, &self.vertices[corner], part, (p, w));
-            scatter(hats, &self.vertices[corner], part, (p_hat, w_hat));
+            scatter(rows, &self.vertices[corner], part, at[corner]);
+            scatter(hats, &self.vertices[corner], part, at_hat[corner]);
         }
     }
 }

@@ -73,9 +73,10 @@ impl Undo for Block {
             ),
         ];
         let moves = times(f, delta);
-        let shift0 = along(moves, wb[0]);
-        let shift1 = along(moves, wb[1]);
-        let shift2 = along(moves, wb[2]);
+        let per_mass = [along(moves, b[0]), along(moves, b[1]), along(moves, b[2])];
+        let shift0 = scaled(per_mass[0], w0);
+        let shift1 = scaled(per_mass[1], w1);
+        let shift2 = scaled(per_mass[2], w2);
         let p = sum(p, shift0);
         let q = difference(q, shift1);
         let r = difference(r, shift2);
@@ -104,29 +105,32 @@ impl Undo for Block {
         } else {
             Lane::load3(simd, &hat.lambda, part)
         };
-        let system = System::new(simd, &alpha, metric(f), m);
-        let right_hat = system.solve(sum(lambda_hat, by_moves));
-        let lambda = Lane::load3(simd, &self.lambda, part);
-        let answered = difference(lambda_hat, complied(&alpha, right_hat));
-        let per_area = Lane::load(simd, &self.per_area, part);
-        let by_alpha = dot(right_hat, complied(&alpha, lambda));
-        (by_alpha * per_area).add_to(&mut hat.area, part);
+        let g = metric(f);
+        let system = System::new(simd, &alpha, g, m);
+        let delta_hat = sum(lambda_hat, by_moves);
+        let right_hat = system.solve(delta_hat);
+        let complied = complied(&alpha, right_hat);
+        let answered = difference(lambda_hat, complied);
         for k in 0..3 {
             answered[k].store(&mut hat.lambda[k], part);
-            (lambda[k] - delta[k]).store(&mut self.lambda[k], part);
         }
+        // r̂·α̃λ before the visit is −r̂·C − Δλ̂·Δλ; λ itself need not be known.
+        let half = Lane::all(simd, 0.5);
+        let c = [half * (g[0] - one), half * (g[2] - one), g[1]];
+        let by_alpha = dot(complied, delta) - dot(right_hat, c) - dot(delta_hat, delta);
+        (by_alpha * Lane::load(simd, &self.per_area, part)).add_to(&mut hat.area, part);
 
         // By F, w, positions and b.
         let turns = times(f, right_hat);
         let by_delta = times(difference2(pulled, weighted(turns, m)), delta);
-        let by_right = times(sum2(weighted(moves, m), f), right_hat);
+        let by_right = times(after, right_hat);
         let f_hat = difference2(by_delta, by_right);
         let against0 = sum(p_hat, along(turns, b[0]));
         let against1 = difference(q_hat, along(turns, b[1]));
         let against2 = difference(r_hat, along(turns, b[2]));
-        let w0_hat = w0_hat - dot(against0, along(moves, b[0]));
-        let w1_hat = w1_hat + dot(against1, along(moves, b[1]));
-        let w2_hat = w2_hat + dot(against2, along(moves, b[2]));
+        let w0_hat = w0_hat - dot(against0, per_mass[0]);
+        let w1_hat = w1_hat + dot(against1, per_mass[1]);
+        let w2_hat = w2_hat + dot(against2, per_mass[2]);
         let p_hat = difference(p_hat, along(f_hat, b[0]));
         let q_hat = sum(q_hat, along(f_hat, b[1]));
         let r_hat = sum(r_hat, along(f_hat, b[2]));
@@ -141,16 +145,10 @@ impl Undo for Block {
         for i in 0..2 {
             let (edge, against, shift) = edges[i];
             let (against, shift) = (difference(against, from), sum(shift, shift0));
-            let pushed = [dot(f[0], against), dot(f[1], against)];
-            let turned = [dot(f[0], shift), dot(f[1], shift)];
-            let u = s00 * pushed[0] + s01 * pushed[1]
-                - (right_hat[0] * turned[0] + right_hat[2] * turned[1])
-                + dot(f_hat[0], edge);
-            let v = s01 * pushed[0] + s11 * pushed[1]
-                - (right_hat[2] * turned[0] + right_hat[1] * turned[1])
-                + dot(f_hat[1], edge);
-            u.add_to(&mut hat.b[2 * i], part);
-            v.add_to(&mut hat.b[2 * i + 1], part);
+            for k in 0..2 {
+                let by_b = dot(moves[k], against) - dot(turns[k], shift) + dot(f_hat[k], edge);
+                by_b.add_to(&mut hat.b[2 * i + k], part);
+            }
         }
     }
 }
@@ -159,12 +157,6 @@ impl Undo for Block {
 #[inline(always)]
 fn weighted<S: Simd>(f: [Lane3<S>; 2], m: Lane3<S>) -> [Lane3<S>; 2] {
     times(f, [m[0], m[2], m[1]])
-}
-
-/// `a + b` of 3 × 2 matrices.
-#[inline(always)]
-fn sum2<S: Simd>(a: [Lane3<S>; 2], b: [Lane3<S>; 2]) -> [Lane3<S>; 2] {
-    [sum(a[0], b[0]), sum(a[1], b[1])]
 }
 
 /// `a − b` of 3 × 2 matrices.

@@ -59,7 +59,9 @@ impl<S: Surface> Setting<'_, S> {
     /// States after each step, of XPBD.
     fn swept(&self, x_bar: &[Vec2]) -> Vec<State> {
         let run = self.trajectory(x_bar);
-        let mut states = run.kept[1..].to_vec();
+        let tau = self.scene.params.step.kept();
+        let later = (1..self.steps).map(|step| run.kept.state(step, tau));
+        let mut states: Vec<State> = later.collect();
         states.push(run.last);
         states
     }
