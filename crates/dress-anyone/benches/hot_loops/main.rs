@@ -21,6 +21,10 @@
 //! | `distance_field` | 900 a sample | 512 a sample, in 16 rows of 32 |
 //! | `cages` | 150 a vertex and control point, a logarithm included | 16 a vertex and control point |
 //! | `pull_back` | 4 a non-zero of L, 300 a triangle, 150 a hinge | 16 a non-zero of L |
+//! | `gradient` | `stiffness`, `factor` and `pull_back` at a state of rest | |
+//! | `steps` | a trajectory of a few steps, each of 12 sweeps and a look for contacts | |
+//! | `steps_back` | the same and its gradient: 900 a triangle and sweep besides | |
+//! | `sensitivities` | `pull_back` for every unknown, in blocks of 16 | |
 //!
 //! Preparing a drape for its derivatives is `stiffness` and `factor` once, or more often where the
 //! stiffness is indefinite.
@@ -34,14 +38,15 @@ use cpu_time::CpuTime;
 use criterion::{Criterion, SamplingMode};
 use dress_anyone::body::DistanceField;
 use dress_anyone::cage::{CageParams, Cages};
-use dress_anyone::geometry::ClosestPoint;
+use dress_anyone::geometry::{ClosestPoint, Vec2};
+use dress_anyone::sim::differentiable::differentiable_at;
 use dress_anyone::sim::energy::contact::Nothing;
 use dress_anyone::sim::energy::layers::LayerParams;
 use dress_anyone::sim::equilibrium::EquilibriumParams;
 use dress_anyone::sim::layers::{Layers, Watch};
 use dress_anyone::sim::step::{State, StepParams, Stepper};
 use dress_anyone::sim::system::System;
-use dress_anyone::sim::{Assembly, Scene, SimParams, Start, drape};
+use dress_anyone::sim::{Assembly, Scene, SimParams, Start, Trajectory, drape};
 use std::hint::black_box;
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -51,8 +56,14 @@ use tube::Tube;
 const SIZES: [usize; 3] = [1_000, 4_000, 10_000];
 /// Sweeps in the step that measures them: the rest of the step then hardly counts.
 const SWEEPS: usize = 64;
+/// Steps of the trajectory that is measured.
+const STEPS: usize = 30;
+/// Steps of a trajectory whose memory is told.
+const LONG: usize = 600;
+/// Unknowns whose sensitivities are measured.
+const UNKNOWNS: [usize; 3] = [50, 100, 200];
 /// Runs of which the shortest tells what two threads bring.
-const RUNS: usize = 100;
+const RUNS: usize = 400;
 /// Force residual at which the tube's drape ends [–].
 const NEARLY_AT_REST: f64 = 1e-3;
 
@@ -158,13 +169,17 @@ fn of_size(criterion: &mut Criterion<CpuTime>, size: usize) -> Vec<summary::Row>
             stepper.step(&mut state, 0.0);
         });
     });
+    // So short that other jobs leave both cores alone for some of them.
+    let watch = Watch::new(&cloth, alone, &at_rest);
+    let mut stepper = Stepper::new(&cloth, &rest, &Nothing, params.contact, params.step, watch);
     let mut step = || {
         state.x.clone_from(&at_rest);
         stepper.step(&mut state, 0.0);
     };
     let [one, two] = [1, 2].map(|threads| least_with(threads, &mut step));
     println!(
-        "{vertices} cloth vertices: sweeps on two threads {:.2} times as fast",
+        "{vertices} cloth vertices: a step of {} sweeps on two threads {:.2} times as fast",
+        params.step.sweeps,
         one / two
     );
     let mut layers = Layers::new(&cloth, params.layers, &at_rest);
@@ -211,10 +226,37 @@ fn of_size(criterion: &mut Criterion<CpuTime>, size: usize) -> Vec<summary::Row>
         b.iter(|| Cages::enclose(&tube.pattern, &tube.mesh, None, &CageParams::default()));
     });
 
+    let run = |steps: usize| {
+        Trajectory::run(&scene, x_bar, at_rest.clone(), steps, &mut |_| true)
+            .expect("nobody asks it to stop")
+    };
+    group.bench_function("steps", |b| b.iter(|| run(STEPS)));
+    group.bench_function("steps_back", |b| b.iter(|| run(STEPS).pull_back(&at_rest)));
+    println!("{LONG} steps keep {} MB", run(LONG).kept() / 1_000_000);
+
     let state = found
         .differentiable(&scene)
         .expect("a shift makes any stiffness definite");
+    println!("stiffness shifted by {} 1/s²", state.shift);
     group.bench_function("pull_back", |b| b.iter(|| state.pull_back(&at_rest)));
+    group.bench_function("gradient", |b| {
+        b.iter(|| {
+            let polished = state.drape.x.clone();
+            let state = differentiable_at(&scene, x_bar, polished, Vec::new())
+                .expect("a shift makes any stiffness definite");
+            state.pull_back(&at_rest)
+        });
+    });
+    for unknowns in UNKNOWNS {
+        // Every unknown moves the whole pattern, as a cage does.
+        let motion = |k: usize| {
+            let wave = move |p: &Vec2| Vec2::new((k as f64 * p.x).sin(), (k as f64 * p.y).cos());
+            x_bar.iter().map(wave).collect::<Vec<_>>()
+        };
+        group.bench_function(format!("sensitivities_{unknowns}"), |b| {
+            b.iter(|| state.sensitivities((0..unknowns).map(motion)));
+        });
+    }
     group.finish();
 
     let row = |(loop_name, items, unit)| summary::Row {
@@ -234,7 +276,13 @@ fn of_size(criterion: &mut Criterion<CpuTime>, size: usize) -> Vec<summary::Row>
         ("closest_point", vertices, "point"),
         ("distance_field", vertices, "point"),
         ("cages", x_bar.len(), "vertex"),
+        ("steps", STEPS * triangles, "triangle"),
+        ("steps_back", STEPS * triangles, "triangle"),
         ("pull_back", vertices, "vertex"),
+        ("gradient", vertices, "vertex"),
+        ("sensitivities_50", vertices, "vertex"),
+        ("sensitivities_100", vertices, "vertex"),
+        ("sensitivities_200", vertices, "vertex"),
     ];
     rows.into_iter().map(row).collect()
 }
