@@ -1,9 +1,11 @@
 //! A body to dress: a triangle mesh in metres, y up, and how its file saw it.
 
 pub mod distance_field;
+mod part;
 
 use crate::geometry::{TriangleMesh, Vec3};
 pub use distance_field::DistanceField;
+pub use part::parted;
 use serde::{Deserialize, Serialize};
 
 /// A body in SI units, y up.

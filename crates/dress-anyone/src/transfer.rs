@@ -2,7 +2,7 @@
 //! O'Malley 2020). Geometry only: not physical, no pattern.
 //!
 //! 1. Carry every cloth vertex from the space around the source body to that around the target
-//!    (`bind`), both with parts that overlap drawn apart (`part`).
+//!    (`bind`), both with parts that overlap drawn apart ([`parted`]).
 //! 2. Repeat: give what touches the body its distance to it (`settle`, `ease`), and relax (`relax`), which
 //!    keeps the garment's layout, lines and layers (`layout`, `layers`) through affine-invariant stencils.
 //!    Along the body cloth is held softly, across it firmly where it touches (`hold`); off the body it
@@ -22,12 +22,11 @@ mod hold;
 mod layers;
 mod layout;
 mod paint;
-mod part;
 mod relax;
 mod room;
 mod settle;
 
-use crate::body::Body;
+use crate::body::{Body, parted};
 use crate::geometry::{ClosestPoint, Mat3, Vec3, bounds};
 use bind::{BodyMap, Carried};
 use clear::{Clearing, belongs};
@@ -141,7 +140,7 @@ pub fn target_shape(
     params: &TransferParams,
 ) -> Result<Target, TransferError> {
     check(drape, &layout.triangles, source, target)?;
-    let skins = [source, target].map(|body| part::parted(&body.mesh));
+    let skins = [source, target].map(|body| parted(&body.mesh));
     let surfaces = [0, 1].map(|k| ClosestPoint::new(&skins[k]));
     let [on_source, on_target] = &surfaces;
     let draped = Draped::new(drape, &layout.triangles, (source, on_source));

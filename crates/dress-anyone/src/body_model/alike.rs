@@ -2,12 +2,13 @@
 //!
 //! Where both have the same triangles and stand alike there is nothing to do. Otherwise the model is
 //! fitted to both; the source stays where and as it stands, for its garment does too, and the target
-//! takes on the source's pose on the same floor, its own surface carried along.
+//! takes on the source's pose on the same floor, its own surface carried along. Thighs that go through each
+//! other there, and do not in its own pose, are drawn apart: flesh would give way.
 
 use super::fit::{Fit, Landmarks, fit};
 use super::skeleton::PELVIS;
 use super::{BodyModel, Pose};
-use crate::body::Body;
+use crate::body::{Body, parted};
 use crate::geometry::{Mat3, TriangleMesh, Vec3, bounds};
 use crate::problem::Problem;
 
@@ -16,7 +17,7 @@ use crate::problem::Problem;
 pub struct Alike {
     /// The source, in its own pose and place.
     pub source: Body,
-    /// The target, in the source's pose.
+    /// The target, in the source's pose, with parts that go through each other there drawn apart.
     pub target: Body,
     /// The target's surface in its own pose, corresponding too.
     pub target_own: TriangleMesh,
@@ -52,7 +53,7 @@ pub fn make_alike(
     };
     Ok(Alike {
         source: place(source, &source_fit.mesh),
-        target: place(target, &posed),
+        target: place(target, &parted(&posed)),
         target_own: target_fit.mesh.clone(),
         fits: [source_fit, target_fit],
     })

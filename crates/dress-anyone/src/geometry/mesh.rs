@@ -2,6 +2,7 @@
 
 use super::Vec3;
 pub use super::bounds;
+use std::collections::BTreeSet;
 
 /// Positions and triangles; triangles are counter-clockwise seen from outside.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -43,4 +44,16 @@ pub fn vertex_normals(positions: &[Vec3], triangles: &[[u32; 3]]) -> Vec<Vec3> {
         *normal = normal.try_normalize(0.0).unwrap_or_else(Vec3::zeros);
     }
     normals
+}
+
+/// The neighbours of every vertex along the triangles' edges, ascending.
+pub fn rings(vertex_count: usize, triangles: &[[u32; 3]]) -> Vec<Vec<u32>> {
+    let mut rings = vec![BTreeSet::new(); vertex_count];
+    for &[a, b, c] in triangles {
+        rings[a as usize].extend([b, c]);
+        rings[b as usize].extend([c, a]);
+        rings[c as usize].extend([a, b]);
+    }
+    let ascending = rings.into_iter().map(|ring| ring.into_iter().collect());
+    ascending.collect()
 }

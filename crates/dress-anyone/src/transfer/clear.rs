@@ -213,11 +213,11 @@ pub(super) fn above(body: &ClosestPoint, x: Vec3) -> Option<(f64, Vec3)> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::draped::rings;
     use super::*;
     use crate::fixture::add_box;
     use crate::geometry::closest_point::tests::sphere;
     use crate::geometry::intersections::between;
+    use crate::geometry::mesh::rings;
 
     #[test]
     fn a_body_that_comes_through_between_vertices_is_cleared() {

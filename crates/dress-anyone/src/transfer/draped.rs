@@ -1,10 +1,9 @@
 //! A garment on the source body, and what its target shape needs to know of it.
 
 use crate::body::Body;
-use crate::geometry::mesh::vertex_normals;
+use crate::geometry::mesh::{rings, vertex_normals};
 use crate::geometry::{ClosestPoint, Vec3};
 use rayon::prelude::*;
-use std::collections::BTreeSet;
 use std::iter::Sum;
 use std::ops::Mul;
 
@@ -85,18 +84,6 @@ impl<'a> Draped<'a> {
         }
         values
     }
-}
-
-/// The neighbours of every vertex along the triangles' edges, ascending.
-pub(super) fn rings(vertex_count: usize, triangles: &[[u32; 3]]) -> Vec<Vec<u32>> {
-    let mut rings = vec![BTreeSet::new(); vertex_count];
-    for &[a, b, c] in triangles {
-        rings[a as usize].extend([b, c]);
-        rings[b as usize].extend([c, a]);
-        rings[c as usize].extend([a, b]);
-    }
-    let ascending = rings.into_iter().map(|ring| ring.into_iter().collect());
-    ascending.collect()
 }
 
 /// Mean length of the edges around each vertex \[m\]; never far below the usual, for slivers and

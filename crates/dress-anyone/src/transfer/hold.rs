@@ -154,9 +154,9 @@ impl Rims {
 
 #[cfg(test)]
 mod tests {
-    use super::super::draped::rings;
     use super::super::relax::{Relaxation, Springs, Stencil};
     use super::*;
+    use crate::geometry::mesh::rings;
 
     /// How much of a displacement across a flat cloth with this wavelength is left \[–\].
     fn left_of_a_wave(edge: f64, wavelength: f64, params: &TransferParams) -> f64 {

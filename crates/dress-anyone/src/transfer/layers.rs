@@ -95,10 +95,10 @@ fn neighbourhood(v: u32, rings: &[Vec<u32>]) -> Vec<u32> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::draped::rings;
     use super::*;
     use crate::geometry::Mat3;
     use crate::geometry::closest_point::tests::sphere;
+    use crate::geometry::mesh::rings;
 
     /// Two balls, one in the other, this far apart, and the ties of both.
     fn shells(gap: f64, facing: f64) -> (usize, Vec<Tie>) {

@@ -298,11 +298,11 @@ fn remove(basis: &[Vec<f64>], row: &mut [f64]) {
 
 #[cfg(test)]
 mod tests {
-    use super::super::draped::rings;
     use super::*;
     use crate::check::noise;
     use crate::geometry::Mat3;
     use crate::geometry::closest_point::tests::sphere;
+    use crate::geometry::mesh::rings;
 
     fn stencils(rings: Vec<Vec<u32>>) -> Vec<Stencil> {
         let stencil = |(v, around)| Stencil {

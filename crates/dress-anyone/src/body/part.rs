@@ -1,9 +1,9 @@
 //! Parts of a body that go through each other are drawn apart: thighs that overlap in a pose that is not
 //! their own leave no place for the cloth between them, and a closest point in there says nothing.
 
-use super::draped::rings;
 use crate::geometry::groups::Groups;
 use crate::geometry::intersections::within;
+use crate::geometry::mesh::rings;
 use crate::geometry::{TriangleMesh, Vec3};
 use std::collections::BTreeSet;
 
@@ -16,7 +16,7 @@ const MORE: usize = 4;
 
 /// `body` with skin that meets other skin moved inward until it does not, and a little further. Folds and toes
 /// that still meet then are as they were.
-pub(super) fn parted(body: &TriangleMesh) -> TriangleMesh {
+pub fn parted(body: &TriangleMesh) -> TriangleMesh {
     let mut pairs = within(&body.positions, &body.triangles);
     if pairs.is_empty() {
         return body.clone();
