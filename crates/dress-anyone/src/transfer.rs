@@ -143,7 +143,7 @@ pub fn target_shape(
     let skins = [source, target].map(|body| parted(&body.mesh));
     let surfaces = [0, 1].map(|k| ClosestPoint::new(&skins[k]));
     let [on_source, on_target] = &surfaces;
-    let draped = Draped::new(drape, &layout.triangles, (source, on_source));
+    let mut draped = Draped::new(drape, &layout.triangles, (source, on_source));
     let map = BodyMap::new(&skins[0], &skins[1]);
     let bound: Vec<Carried> = (0..drape.len())
         .into_par_iter()
@@ -156,6 +156,8 @@ pub fn target_shape(
             )
         })
         .collect();
+    let carried: Vec<Vec3> = bound.iter().map(|carried| carried.point).collect();
+    draped.meet(&carried, (skins[1].area() / skins[0].area()).sqrt());
     let turns: Vec<Mat3> = drape.par_iter().map(|&x| map.turn(x)).collect();
     let slopes = hang::slopes(&draped, &bound, &turns);
     let grounds = grounds(
@@ -212,7 +214,7 @@ pub fn target_shape(
     let mut least: Vec<f64> = (settling.grounds.iter())
         .map(|ground| ground.wanted.clamp(0.0, params.thickness))
         .collect();
-    let mut x: Vec<Vec3> = bound.iter().map(|carried| carried.point).collect();
+    let mut x = carried;
     let (iterations, converged) = settling.settle(&mut x, &least);
     for _ in 0..SMOOTHINGS {
         let mut cleared = x.clone();

@@ -19,6 +19,13 @@ impl TriangleMesh {
         self.triangles[t].map(|v| self.positions[v as usize])
     }
 
+    /// The area of all triangles \[m²\].
+    pub fn area(&self) -> f64 {
+        let doubled = |[a, b, c]: [Vec3; 3]| (b - a).cross(&(c - a)).norm();
+        let all = (0..self.triangles.len()).map(|t| 0.5 * doubled(self.corners(t)));
+        all.sum()
+    }
+
     /// Smallest and largest corner of the box around all vertices \[m\].
     pub fn bounds(&self) -> (Vec3, Vec3) {
         bounds(&self.positions)

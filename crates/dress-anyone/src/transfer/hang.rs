@@ -21,10 +21,11 @@ use super::draped::Draped;
 use super::relax::{FLEXIBILITY, Slope};
 use crate::geometry::{Mat3, Vec3};
 
-/// Length below which the stencils decide, and above which tension does, as share of the body's height: 5 cm.
-const STIFF: f64 = 0.03;
-/// c: tension around the body over that along the hang.
-const TAUT: f64 = 3.0;
+/// Length below which the stencils decide, and above which tension does, as share of the body's height: 9 cm.
+const STIFF: f64 = 0.05;
+/// c: tension around the body over that along the hang. Less lets go of the body what has little to hold on to on
+/// its way there, and it does not find back.
+const TAUT: f64 = 20.0;
 
 /// Slopes of a cloth that is carried to `bound`, about a body that turns by `turns` at large.
 pub(super) fn slopes(draped: &Draped<'_>, bound: &[Carried], turns: &[Mat3]) -> Vec<Slope> {

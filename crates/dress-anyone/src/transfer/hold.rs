@@ -20,11 +20,11 @@ use crate::geometry::groups::Groups;
 const TOUCHING: (f64, f64) = (0.0024, 0.009);
 /// ℓ across, of cloth that does not touch, as share of the body's height.
 const LOOSE: f64 = 0.25;
-/// ℓ along, off the lines, of cloth that touches, as share of the body's height: 9 cm. Longer ones even cloth out
+/// ℓ along, off the lines, of cloth that touches, as share of the body's height: 6 cm. Longer ones even cloth out
 /// more, and lose more of its place on the way there and back.
-const DRIFT: f64 = 0.05;
-/// ℓ along of cloth that does not touch: 20 cm. Shorter ones push the folds of a skirt through each other.
-const SWING: f64 = 0.12;
+const DRIFT: f64 = 0.035;
+/// ℓ along of cloth that does not touch: 9 cm.
+const SWING: f64 = 0.05;
 /// Rims this close, as share of the body's height, grip it if most of the rim does: waistbands, cuffs, collars.
 /// 1.5 cm.
 const GRIP: f64 = 0.009;

@@ -113,6 +113,28 @@ fn a_scaled_body_gives_the_scaled_drape_with_relative_ease() {
 }
 
 #[test]
+fn there_and_back_is_where_it_was() {
+    // Wider, and shorter above the middle.
+    let change = |p: Vec3| {
+        let above = p.y.max(0.0);
+        Vec3::new(p.x * 1.15, p.y - 0.3 * above * above / (above + 0.1), p.z)
+    };
+    let (source, drape, triangles) = dressed();
+    let target = moved(&source, change);
+    let params = TransferParams::default();
+    let there = carry(&drape, &triangles, &source, &target, &params).unwrap();
+    let back = carry(&there.x_star, &triangles, &target, &source, &params).unwrap();
+    let apart = |x: &[Vec3]| {
+        let sum: f64 = x.iter().zip(&drape).map(|(a, b)| (a - b).norm()).sum();
+        sum / drape.len() as f64
+    };
+    // The way there is 6 cm.
+    assert!(apart(&there.x_star) > 0.05);
+    let missed = apart(&back.x_star);
+    assert!(missed < 3e-3, "{missed}");
+}
+
+#[test]
 fn a_larger_body_keeps_the_ease_in_metres() {
     let (drape, target) = transfer(|p| p * 1.2, Ease::Absolute);
     let (source, ..) = dressed();
