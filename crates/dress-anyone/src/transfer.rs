@@ -7,7 +7,8 @@
 //!    keeps the garment's layout, lines and layers (`layout`, `layers`) through affine-invariant stencils.
 //!    Along the body cloth is held softly, across it firmly where it touches (`hold`); off the body it
 //!    hangs, and bridges (`hang`).
-//! 3. Take it out of the body (`clear`), and where triangles met it, relax once more.
+//! 3. Where folds went through each other, hold them less and repeat (`folds`).
+//! 4. Take it out of the body (`clear`), and where triangles met it, relax once more.
 //!
 //! Departures from the original: binding is to a smooth patch of body, not to a closest point, and
 //! rebinding restores distances along the normal only; the place along the body stays tied to the
@@ -17,6 +18,7 @@ mod bind;
 mod clear;
 mod draped;
 mod ease;
+mod folds;
 mod hang;
 mod hold;
 mod layers;
@@ -32,6 +34,7 @@ use bind::{BodyMap, Carried};
 use clear::{Clearing, belongs};
 use draped::Draped;
 pub use ease::{Ease, EaseAt};
+use folds::Folds;
 use hold::Rims;
 pub use layout::{Layout, Zone};
 pub use paint::Paint;
@@ -125,6 +128,8 @@ pub enum TransferError {
 const GRIP: f64 = 0.02;
 /// First step of a triangle that meets the body, as share of its height: half a millimetre.
 const STEP: f64 = 3e-4;
+/// Times that folds which go through each other are let go.
+const LOOSENINGS: usize = 3;
 /// Times that a garment which met the body is relaxed again, to even out what was pushed.
 const SMOOTHINGS: usize = 2;
 /// Carries a drape from `source` to `target`, two bodies of one topology.
@@ -187,7 +192,7 @@ pub fn target_shape(
     stencils.extend(layout.line_stencils());
     let usual: Vec<Hold> = grounds.iter().map(Ground::usual).collect();
     let (low, high) = bounds(drape);
-    let settling = Settling {
+    let mut settling = Settling {
         relaxation: Relaxation::new(drape, &stencils, &usual, springs),
         body: on_target,
         bound: &bound,
@@ -215,7 +220,20 @@ pub fn target_shape(
         .map(|ground| ground.wanted.clamp(0.0, params.thickness))
         .collect();
     let mut x = carried;
-    let (iterations, converged) = settling.settle(&mut x, &least);
+    let (mut iterations, mut converged) = settling.settle(&mut x, &least);
+    let folds = Folds::new(drape, &layout.triangles, &draped.rings);
+    for _ in 0..LOOSENINGS {
+        let around = folds.around_meetings(&x);
+        if around.is_empty() {
+            break;
+        }
+        for v in around {
+            settling.grounds[v as usize].firmness.let_go();
+        }
+        let (more, settled) = settling.settle(&mut x, &least);
+        iterations += more;
+        converged = settled;
+    }
     for _ in 0..SMOOTHINGS {
         let mut cleared = x.clone();
         if !clearing.clear(&mut cleared, &mut least) {

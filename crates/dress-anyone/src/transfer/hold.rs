@@ -25,6 +25,8 @@ const LOOSE: f64 = 0.25;
 const DRIFT: f64 = 0.035;
 /// ℓ along of cloth that does not touch: 9 cm.
 const SWING: f64 = 0.05;
+/// Part of the hold along the body that is left where cloth is let go: ℓ grows by 3/5.
+const LEFT: f64 = 0.15;
 /// Rims this close, as share of the body's height, grip it if most of the rim does: waistbands, cuffs, collars.
 /// 1.5 cm.
 const GRIP: f64 = 0.009;
@@ -49,6 +51,11 @@ pub(super) struct Firmness {
 }
 
 impl Firmness {
+    /// Holds less firmly along the body.
+    pub(super) fn let_go(&mut self) {
+        self.along *= LEFT;
+    }
+
     /// The hold of a vertex that does not touch the body, where `across` points away from it.
     pub(super) fn loose(&self, across: Vec3) -> Hold {
         Hold::from_diagonal_element(self.along)
