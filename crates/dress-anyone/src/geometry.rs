@@ -3,6 +3,7 @@
 pub mod box_tree;
 pub mod bvh;
 pub mod closest_point;
+pub mod graph;
 pub mod groups;
 pub mod intersections;
 pub mod mesh;

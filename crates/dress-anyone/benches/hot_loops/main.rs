@@ -17,6 +17,7 @@
 //! | `sweep` | 305 a triangle: 200 for its membrane, 70 for each of its 1.5 hinges | 280 and 1.5 × 350 |
 //! | `pairs` | looks for tangles, and for layers that may touch in a move of 2 mm | |
 //! | `stiffness` | 900 a triangle, 40 a hinge | 9 blocks of 72 a triangle, written |
+//! | `structure` | the order of elimination and the symbolic phase, once for a cloth | |
 //! | `factor` | Σ l² over the columns of L, l their lengths; about n^1.5 | 8 a non-zero of L, at least |
 //! | `closest_point` | 60 a triangle visited, 30 a box | 72 and 48; what is visited depends on the point |
 //! | `distance_field` | 900 a sample | 512 a sample, in 16 rows of 32 |
@@ -207,6 +208,7 @@ fn of_size(criterion: &mut Criterion<CpuTime>, size: usize) -> Vec<summary::Row>
     group.bench_function("stiffness", |b| {
         b.iter(|| system.stiffness(&assembly, &at_rest, &[], 1.0));
     });
+    group.bench_function("structure", |b| b.iter(|| Assembly::new(&cloth)));
     let stiffness = system.stiffness(&assembly, &at_rest, &[], 0.0);
     group.bench_function("factor", |b| b.iter(|| stiffness.factor()));
 
@@ -276,6 +278,7 @@ fn of_size(criterion: &mut Criterion<CpuTime>, size: usize) -> Vec<summary::Row>
         ("sweep", triangles, "triangle"),
         ("pairs", triangles, "triangle"),
         ("stiffness", triangles, "triangle"),
+        ("structure", vertices, "vertex"),
         ("factor", vertices, "vertex"),
         ("closest_point", vertices, "point"),
         ("distance_field", vertices, "point"),

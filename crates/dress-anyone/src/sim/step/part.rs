@@ -16,6 +16,7 @@ use super::lanes::Four;
 use super::pull_back::RestHat;
 use super::stretch::Stretch;
 use super::turn::Turn;
+use crate::geometry::graph::walk_from_end;
 use crate::sim::cloth::{Cloth, Rest};
 use crate::sim::energy::contact::{ContactParams, Surface};
 use rayon::join;
@@ -349,40 +350,12 @@ fn order(cloth: &Cloth, most: usize) -> Vec<u32> {
 /// Brings `vertices` into the order of a walk from one end of them, and then each half of them.
 /// `inside` is false everywhere, before and after.
 fn arrange(vertices: &mut [u32], neighbours: &[Vec<u32>], most: usize, inside: &mut [bool]) {
-    // Where a walk from anywhere ends is an end.
-    for _ in 0..2 {
-        vertices.reverse();
-        let walked = walk_over(vertices, neighbours, inside);
-        vertices.copy_from_slice(&walked);
-    }
+    walk_from_end(vertices, neighbours, inside);
     if vertices.len() > most {
         let (low, high) = vertices.split_at_mut(vertices.len() / 2);
         arrange(low, neighbours, most, inside);
         arrange(high, neighbours, most, inside);
     }
-}
-
-/// `vertices` in the order in which a walk over neighbours, breadth first, comes to them from the first.
-fn walk_over(vertices: &[u32], neighbours: &[Vec<u32>], inside: &mut [bool]) -> Vec<u32> {
-    for v in vertices {
-        inside[*v as usize] = true;
-    }
-    let mut walked = Vec::with_capacity(vertices.len());
-    for &start in vertices {
-        let mut next = walked.len();
-        if std::mem::take(&mut inside[start as usize]) {
-            walked.push(start);
-        }
-        while let Some(&v) = walked.get(next) {
-            next += 1;
-            for &w in &neighbours[v as usize] {
-                if std::mem::take(&mut inside[w as usize]) {
-                    walked.push(w);
-                }
-            }
-        }
-    }
-    walked
 }
 
 #[cfg(test)]
