@@ -63,9 +63,11 @@ pub struct RefitParams {
     pub loss: LossParams,
     /// The search.
     pub descent: DescentParams,
-    /// Vertices of the mesh that is searched first, from which the garment's own mesh takes over;
-    /// 0 for none. The paper has none.
+    /// Vertices of the mesh that is searched first; 0 for none. The paper has none.
     pub coarse: usize,
+    /// Vertices of the mesh that is searched next, from which a finer one takes over; 0 for none. The paper
+    /// has none.
+    pub medium: usize,
 }
 
 impl RefitParams {
@@ -101,6 +103,7 @@ impl Default for RefitParams {
             loss: LossParams::default(),
             descent: DescentParams::default(),
             coarse: 800,
+            medium: 2500,
         }
     }
 }

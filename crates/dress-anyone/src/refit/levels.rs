@@ -4,7 +4,8 @@
 //! A guide is a spring from every vertex to its place in x* ([`Cloth::guided`](crate::sim::Cloth::guided));
 //! at rate k it gives way by g/k under the cloth's weight. Firmly guided cloth has few wrinkles and few
 //! drapes, and the loss few dents. As k falls, drape and pattern follow: continuation (Allgower & Georg
-//! 1990). The first level is searched in a coarse mesh if the garment's own is fine; the last decides.
+//! 1990). The first level is searched in a coarse mesh, and if the garment's own is fine all but the last in
+//! meshes coarser than that; the last decides.
 
 use super::checkpoint::{Checkpoint, Keep};
 use super::flatten::flatten;
@@ -12,23 +13,37 @@ use super::prepare::Prepared;
 use super::search::point::Failed;
 use super::search::{Guess, Run, Search, Settled};
 use super::{Clock, Found, Observer, RefitError};
+use crate::body::DistanceField;
 use crate::descent::{Gradient, Optimizer};
 use crate::geometry::Vec3;
+use crate::pattern::resample::resample;
 use crate::report::Ending;
-use crate::sim::Scene;
+use crate::sim::{Scene, SimParams, Start, drape};
 
 /// Rates of the guides \[1/s²\]: weight stretches them by 1 and 10 cm.
 const RATES: [f64; 2] = [1000.0, 100.0];
+/// Rates by which the cloth of a pattern found in a coarser mesh is let down \[1/s²\].
+const LET_DOWN: [f64; 3] = [1000.0, 100.0, 10.0];
 /// Most Levenberg–Marquardt steps of a guided level; the next takes them up.
 const GUIDED_STEPS: usize = 4;
 /// Falls of the loss not worth another step in guided cloth \[–\].
 const GUIDED_TOLERANCE: f64 = 1e-2;
 
+/// Residual at which cloth that is not to be differentiated counts as at rest \[–\].
+const NEARLY: f64 = 0.1;
+
+/// Which mesh of the garment.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Mesh {
+    Own,
+    Medium,
+    Coarse,
+}
+
 /// A level of the search.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 struct Level {
-    /// Whether it is searched in the coarse mesh.
-    coarse: bool,
+    mesh: Mesh,
     /// k \[1/s²\]; 0 in free cloth.
     rate: f64,
 }
@@ -40,10 +55,16 @@ pub(super) fn searched(
     clock: &mut Clock,
     observe: &mut Observer<'_>,
 ) -> Result<Found, RefitError> {
-    let coarse = prepared.coarser();
-    let coarser = coarse.as_ref().map(|garment| prepared.on_mesh_of(garment));
-    let coarser = coarser.transpose()?;
-    let levels = levels(prepared.params.descent.gradient, coarser.is_some());
+    let params = prepared.params;
+    let [medium, coarse] = [params.medium, params.coarse].map(|count| prepared.coarser(count));
+    let [medium, coarse] = [&medium, &coarse].map(|garment| {
+        let garment = garment.as_ref();
+        garment
+            .map(|garment| prepared.on_mesh_of(garment))
+            .transpose()
+    });
+    let (medium, coarse) = (medium?, coarse?);
+    let levels = levels(params.descent.gradient, medium.is_some(), coarse.is_some());
     let mut run = Run::new(clock, observe);
     let (from, initial) = match &checkpoint {
         None => (0, first_drape(prepared, &mut run)?),
@@ -53,33 +74,40 @@ pub(super) fn searched(
         }
         Some(_) => return Err(RefitError::OtherCheckpoint),
     };
-    let mut last: Result<Settled, RefitError> = Err(RefitError::Stopped);
+    let mut last: Result<(Mesh, Settled), RefitError> = Err(RefitError::Stopped);
     for (number, level) in levels.iter().enumerate().skip(from) {
-        if run.stopped() && level.rate > 0.0 {
+        if run.stopped() && number + 1 < levels.len() {
             continue;
         }
-        let on = match &coarser {
-            Some(coarser) if level.coarse => coarser,
+        let on = match (level.mesh, &medium, &coarse) {
+            (Mesh::Medium, Some(medium), _) => medium,
+            (Mesh::Coarse, _, Some(coarse)) => coarse,
             _ => prepared,
         };
+        let same = matches!(&last, Ok((mesh, _)) if *mesh == level.mesh);
         let mut guesses = vec![match &last {
             Err(_) => from_target(on, flatten(on)),
-            Ok(found) if found.x.len() == on.x_star.len() => Guess {
+            Ok((_, found)) if same => Guess {
                 zeta: found.zeta.clone(),
                 x: found.x.clone(),
             },
-            Ok(found) => from_target(on, found.zeta.clone()),
+            Ok((_, found)) if level.rate == 0.0 => let_down(on, &found.zeta, &mut run),
+            Ok((_, found)) => from_target(on, found.zeta.clone()),
         }];
-        guesses.push(if level.rate == 0.0 {
-            let x = initial.clone();
-            let zeta = on.initial();
-            Guess { zeta, x }
+        if level.rate == 0.0 {
+            guesses.push(Guess {
+                zeta: on.initial(),
+                x: match level.mesh {
+                    Mesh::Own => initial.clone(),
+                    _ => resample(&prepared.garment.mesh, &initial, &on.garment.mesh),
+                },
+            });
         } else if number == 0 {
-            from_target(on, on.initial())
-        } else {
+            guesses.push(from_target(on, on.initial()));
+        } else if same {
             // Not caught in what the last level was.
-            from_target(on, guesses[0].zeta.clone())
-        });
+            guesses.push(from_target(on, guesses[0].zeta.clone()));
+        }
         run.stage(level.stage());
         let keep = Keep {
             params: prepared.params,
@@ -89,11 +117,11 @@ pub(super) fn searched(
         };
         let found = level.search(on, guesses, checkpoint.take(), keep, &mut run)?;
         let found = found.map_err(|failed| failed.on(&prepared.target.name));
-        if found.is_ok() || level.rate == 0.0 {
-            last = found;
+        if found.is_ok() || number + 1 == levels.len() {
+            last = found.map(|found| (level.mesh, found));
         }
     }
-    let found = last?;
+    let (_, found) = last?;
     Ok(Found {
         x_bar: prepared.cages.deform(&found.zeta),
         x: found.x,
@@ -108,28 +136,69 @@ pub(super) fn searched(
 }
 
 /// The levels of a refit. Time steps have no guides, as they have none in the paper.
-fn levels(gradient: Gradient, coarse: bool) -> Vec<Level> {
-    let own = |rate| Level {
-        coarse: false,
-        rate,
-    };
+fn levels(gradient: Gradient, medium: bool, coarse: bool) -> Vec<Level> {
+    let at = |mesh, rate| Level { mesh, rate };
+    let last = at(Mesh::Own, 0.0);
     if gradient == Gradient::Trajectory {
-        return vec![own(0.0)];
+        return vec![last];
     }
-    let first = coarse.then_some(Level {
-        coarse: true,
-        rate: RATES[0],
-    });
-    let guided = RATES.into_iter().map(own);
-    first.into_iter().chain(guided).chain([own(0.0)]).collect()
+    let mut levels = Vec::new();
+    if coarse {
+        levels.push(at(Mesh::Coarse, RATES[0]));
+    }
+    let mesh = if medium { Mesh::Medium } else { Mesh::Own };
+    levels.extend(RATES.map(|rate| at(mesh, rate)));
+    if medium {
+        levels.push(at(Mesh::Medium, 0.0));
+    }
+    levels.push(last);
+    levels
 }
 
-/// The drape of the scaled reference in free cloth, noted as where the search begins.
+/// The drape of the scaled reference in free cloth, almost at rest, noted as where the search begins.
 fn first_drape(prepared: &Prepared<'_>, run: &mut Run<'_, '_>) -> Result<Vec<Vec3>, RefitError> {
     run.stage("first guess");
     let scene = prepared.scene();
+    let sim = nearly(&scene);
+    let scene = Scene {
+        params: &sim,
+        ..scene
+    };
     let first = from_target(prepared, prepared.initial());
     prepared.search(&scene).first(first, run)
+}
+
+/// A pattern, and its cloth let down from the target shape by guides that give way one after the other: so it
+/// keeps the folds of the target shape where it can.
+fn let_down(on: &Prepared<'_>, zeta: &[f64], run: &mut Run<'_, '_>) -> Guess {
+    let mut guess = from_target(on, zeta.to_vec());
+    let x_bar = on.cages.deform(zeta);
+    for rate in LET_DOWN {
+        let free = on.scene();
+        let cloth = free.cloth.clone().guided(on.x_star.clone(), rate);
+        let mut sim = nearly(&free);
+        sim.equilibrium.iterations = on.params.descent.patience;
+        let scene = Scene {
+            cloth: &cloth,
+            params: &sim,
+            ..free
+        };
+        let found = drape(&scene, &x_bar, guess.x, Start::Near, &mut |p, _| {
+            run.drapes(p)
+        });
+        run.count(&found);
+        guess.x = found.x;
+    }
+    guess
+}
+
+/// A scene's parameters with drapes that end when they are almost at rest.
+fn nearly(scene: &Scene<'_, DistanceField>) -> SimParams {
+    let mut sim = *scene.params;
+    let rest = &mut sim.equilibrium;
+    rest.tolerance = rest.tolerance.max(NEARLY);
+    rest.polished = rest.polished.max(NEARLY);
+    sim
 }
 
 /// A pattern, to be draped from the target shape.
@@ -140,10 +209,11 @@ fn from_target(on: &Prepared<'_>, zeta: Vec<f64>) -> Guess {
 
 impl Level {
     fn stage(self) -> &'static str {
-        match self {
-            Self { rate: 0.0, .. } => "search",
-            Self { coarse: true, .. } => "guided search, coarse mesh",
-            Self { coarse: false, .. } => "guided search",
+        match (self.rate > 0.0, self.mesh == Mesh::Own) {
+            (false, true) => "search",
+            (false, false) => "search, coarser mesh",
+            (true, true) => "guided search",
+            (true, false) => "guided search, coarser mesh",
         }
     }
 
@@ -193,18 +263,27 @@ impl Level {
 
 #[cfg(test)]
 mod tests {
+    use super::Mesh::{Coarse, Medium, Own};
     use super::*;
 
     #[test]
     fn levels_go_from_coarse_to_fine_and_from_guided_to_free() {
-        let each = |gradient, coarse| -> Vec<(bool, f64)> {
-            let levels = levels(gradient, coarse).into_iter();
-            levels.map(|level| (level.coarse, level.rate)).collect()
+        let each = |gradient, medium, coarse| -> Vec<(Mesh, f64)> {
+            let levels = levels(gradient, medium, coarse).into_iter();
+            levels.map(|level| (level.mesh, level.rate)).collect()
         };
-        let own = [(false, 1000.0), (false, 100.0), (false, 0.0)];
-        assert_eq!(each(Gradient::Equilibrium, false), own);
-        let all = each(Gradient::Equilibrium, true);
-        assert_eq!((all[0], &all[1..]), ((true, 1000.0), &own[..]));
-        assert_eq!(each(Gradient::Trajectory, false), [(false, 0.0)]);
+        let own = [(Own, 1000.0), (Own, 100.0), (Own, 0.0)];
+        assert_eq!(each(Gradient::Equilibrium, false, false), own);
+        let all = each(Gradient::Equilibrium, false, true);
+        assert_eq!((all[0], &all[1..]), ((Coarse, 1000.0), &own[..]));
+        let all = [
+            (Coarse, 1000.0),
+            (Medium, 1000.0),
+            (Medium, 100.0),
+            (Medium, 0.0),
+            (Own, 0.0),
+        ];
+        assert_eq!(each(Gradient::Equilibrium, true, true), all);
+        assert_eq!(each(Gradient::Trajectory, false, false), [(Own, 0.0)]);
     }
 }

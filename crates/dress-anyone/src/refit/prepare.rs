@@ -17,7 +17,7 @@ use crate::sim::{Assembly, Cloth, Scene};
 use crate::transfer::{Layout, target_shape};
 use std::sync::Arc;
 
-/// A mesh of less than this many times the coarse one's vertices is searched at once.
+/// A mesh of less than this many times a coarser one's vertices needs no coarser one.
 const WORTH_COARSENING: usize = 2;
 
 /// Everything that follows from garment, bodies and parameters, and that no search changes.
@@ -123,10 +123,10 @@ impl<'a> Prepared<'a> {
         Self::aiming(self.garment, drapes, self.symmetry, body, self.params)
     }
 
-    /// The garment in a mesh of about [`RefitParams::coarse`] vertices; none if it has few more than
-    /// that itself, or cannot be meshed so coarsely, or is searched in the paper's way.
-    pub(super) fn coarser(&self) -> Option<Garment> {
-        let (count, wanted) = (self.garment.mesh.cloth_vertex_count, self.params.coarse);
+    /// The garment in a mesh of about `wanted` vertices; none if it has few more than that itself, or cannot be
+    /// meshed so coarsely, or is searched in the paper's way.
+    pub(super) fn coarser(&self, wanted: usize) -> Option<Garment> {
+        let count = self.garment.mesh.cloth_vertex_count;
         let paper = self.params.descent.gradient == Gradient::Trajectory;
         if paper || wanted == 0 || count < WORTH_COARSENING * wanted {
             return None;

@@ -133,14 +133,15 @@ impl<'s, S: Surface> Search<'s, S> {
         let mut best: Option<Box<Point<'s>>> = None;
         let mut failed = Failed::NEVER_TRIED;
         for guess in guesses {
-            match self.candidate(guess.zeta, guess.x, run) {
-                Ok(tried) if best.as_ref().is_none_or(|best| tried.total < best.total) => {
+            let beaten = best.as_ref().map_or(f64::INFINITY, |best| best.total);
+            match self.trial(&guess.zeta, guess.x, beaten, usize::MAX, run) {
+                Ok(Some(tried)) => {
                     let next = self.accept(tried);
                     let far = best.map_or(0.0, |best| farthest(&next.x_bar, &best.x_bar));
                     run.note(self, &next, far);
                     best = Some(next);
                 }
-                Ok(_) => {}
+                Ok(None) => {}
                 Err(why) => failed = why,
             }
         }

@@ -35,6 +35,8 @@ enum Stiffness {
 /// modes of a garment (a pendulum of 1 m has g/l ≈ 10).
 const FIRST_SHIFT: f64 = 1e-3;
 
+/// Residual above which indefinite stiffness tells of no saddle, for the state is not at rest \[–\].
+const SADDLE_BELOW: f64 = 1e-3;
 /// Kicks off saddles before the stiffness is shifted instead.
 const KICKS: usize = 3;
 /// Farthest any vertex moves in a kick \[m\].
@@ -62,7 +64,7 @@ impl Drape {
             touch = self.settle(scene, touch, sigma, &polish, &mut |_, _, _| true);
             let system = system(scene, &self.rest, &self.grips);
             let (factor, shift) = shifted_factor(&system, &touch, &self.x)?;
-            if shift == 0.0 || kicks == KICKS {
+            if shift == 0.0 || kicks == KICKS || self.residual > SADDLE_BELOW {
                 break (exact(&system, &touch, &self.x, factor, shift)?, shift);
             }
             kicks += 1;

@@ -135,6 +135,9 @@ const LEAST_EXACTNESS: f64 = 0.1;
 const MOST_GROWTH: f64 = 0.25;
 /// Least such growth: what a part that proves too large halves comes back with time.
 const LEAST_GROWTH: f64 = 0.05;
+/// Newton steps that move no vertex farther than this are round-off of positions of a metre or two \[m\]:
+/// in fine cloth they end before the residual is as low as asked for.
+const ROUND_OFF: f64 = 1e-14;
 /// Residual below which energy differences drown in round-off, and the residual itself must fall.
 const ROUND_OFF_BELOW: f64 = 1e-4;
 /// A garment whose centre moves this far \[m\] over [`SLIDE_WINDOW`] late iterations slides.
@@ -203,6 +206,10 @@ pub fn find<S: Surface>(
         let farthest = direction.iter().map(Vec3::norm).fold(0.0, f64::max);
         if !farthest.is_finite() {
             status = RestStatus::NotFinite;
+            break;
+        }
+        if farthest < ROUND_OFF && sigma <= LEAST_SIGMA {
+            status = RestStatus::AtRest;
             break;
         }
         let scale = (params.step / farthest).min(1.0);

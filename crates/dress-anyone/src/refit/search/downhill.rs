@@ -56,11 +56,12 @@ impl<'s, S: Surface> Search<'s, S> {
             slope.length = self.reach(best, &step);
             if can_be_cut(self.cages, self.mesh, &zeta, floor) {
                 let wanted = best.total + WORTH * gradient.dot(&step);
-                match self.trial(zeta, self.predict(best, &step), run) {
+                let start = self.predict(best, &step);
+                match self.trial(&zeta, start, wanted, self.params.patience, run) {
                     Err(failed) if failed.status == RestStatus::Stopped => {
                         return Stepped::Interrupted;
                     }
-                    Ok(next) if next.total < wanted => {
+                    Ok(Some(next)) => {
                         slope.length *= 2.0;
                         let next = self.accept(next);
                         slope.learn(step, &next.gradient - &best.gradient);

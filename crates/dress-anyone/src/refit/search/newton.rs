@@ -39,11 +39,12 @@ impl<'s, S: Surface> Search<'s, S> {
                 };
             }
             if can_be_cut(self.cages, self.mesh, &zeta, floor) {
-                match self.trial(zeta, self.predict(best, &step), run) {
+                let start = self.predict(best, &step);
+                match self.trial(&zeta, start, best.total, self.params.patience, run) {
                     Err(failed) if failed.status == RestStatus::Stopped => {
                         return Stepped::Interrupted;
                     }
-                    Ok(next) if next.total < best.total => {
+                    Ok(Some(next)) => {
                         damping.relax();
                         return Stepped::Better(self.accept(next));
                     }

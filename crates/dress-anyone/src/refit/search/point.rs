@@ -8,10 +8,17 @@ use crate::loss::Loss;
 use crate::refit::RefitError;
 use crate::refit::checkpoint::Checkpoint;
 use crate::sim::differentiable::{Differentiable, differentiable_at};
+use crate::sim::drape::DrapeProgress;
 use crate::sim::energy::contact::Surface;
 use crate::sim::equilibrium::RestStatus;
-use crate::sim::{Scene, SimParams, Start, Trajectory, drape};
+use crate::sim::{Start, Trajectory, drape};
 use nalgebra::DVector;
+
+/// Residual at which a trial is judged \[–\]: from there to rest the loss changes by a percent or two.
+const JUDGED: f64 = 0.1;
+
+/// Told how a trial's drape is getting on; whether to go on with it.
+type Judge<'a> = dyn FnMut(DrapeProgress, &dyn Fn() -> Vec<Vec3>) -> bool + 'a;
 
 /// Where a drape ended, with what its derivative needs.
 pub(in crate::refit) enum End<'a, S> {
@@ -125,33 +132,60 @@ impl<'s, S: Surface> Search<'s, S> {
         start: Vec<Vec3>,
         run: &mut Run<'_, '_>,
     ) -> Result<Candidate<'s, S>, Failed> {
-        self.draped(zeta, start, self.scene.params, run)
+        let all = &mut |_, _: &dyn Fn() -> Vec<Vec3>| true;
+        self.draped(zeta, start, all, run)
     }
 
-    /// The same for a step from a drape: one that takes long to come to rest is not worth it.
+    /// The same if its loss is below `wanted`: what is not when the cloth is almost at rest is not draped to
+    /// its end, nor is what takes more than `patience` factorisations.
     pub(super) fn trial(
         &self,
-        zeta: Vec<f64>,
+        zeta: &[f64],
         start: Vec<Vec3>,
+        wanted: f64,
+        patience: usize,
         run: &mut Run<'_, '_>,
-    ) -> Result<Candidate<'s, S>, Failed> {
-        let mut sim = *self.scene.params;
-        let most = &mut sim.equilibrium.iterations;
-        *most = self.params.patience.min(*most);
-        self.draped(zeta, start, &sim, run)
+    ) -> Result<Option<Candidate<'s, S>>, Failed> {
+        let x_bar = self.cages.deform(zeta);
+        let (mut promising, mut refused) = (false, false);
+        let mut judge = |progress, x: &dyn Fn() -> Vec<Vec3>| {
+            let DrapeProgress::Settling {
+                iteration,
+                residual,
+            } = progress
+            else {
+                return true;
+            };
+            if promising {
+                refused = iteration >= patience;
+            } else if residual < JUDGED {
+                let loss = self.losses.evaluate(&x(), &x_bar);
+                promising = self.total(&loss, zeta) < wanted;
+                refused = !promising;
+            } else {
+                refused = iteration >= patience;
+            }
+            !refused
+        };
+        let tried = self.draped(zeta.to_vec(), start, &mut judge, run);
+        if refused {
+            return Ok(None);
+        }
+        let tried = tried?;
+        Ok((tried.total < wanted).then_some(tried))
     }
 
     fn draped(
         &self,
         zeta: Vec<f64>,
         start: Vec<Vec3>,
-        sim: &SimParams,
+        judge: &mut Judge<'_>,
         run: &mut Run<'_, '_>,
     ) -> Result<Candidate<'s, S>, Failed> {
         let x_bar = self.cages.deform(&zeta);
         run.count_drape();
         let end = match self.params.gradient {
-            Gradient::Equilibrium => self.rest(&x_bar, start, sim, run)?,
+            Gradient::Equilibrium => self.rest(&x_bar, start, judge, run)?,
             Gradient::Trajectory => self.path(&x_bar, start, run)?,
         };
         let loss = self.losses.evaluate(end.x(), &x_bar);
@@ -168,21 +202,20 @@ impl<'s, S: Surface> Search<'s, S> {
         &self,
         x_bar: &[Vec2],
         start: Vec<Vec3>,
-        sim: &SimParams,
+        judge: &mut Judge<'_>,
         run: &mut Run<'_, '_>,
     ) -> Result<End<'s, S>, Failed> {
-        let scene = Scene {
-            params: sim,
-            ..*self.scene
-        };
-        let found = drape(&scene, x_bar, start, Start::Near, &mut |p, _| run.drapes(p));
-        run.count_factorisations(found.iterations);
+        let found = drape(self.scene, x_bar, start, Start::Near, &mut |p, x| {
+            run.drapes(p) && judge(p, x)
+        });
         let (status, residual) = (found.status, found.residual);
         let failed = Failed { status, residual };
         if status != RestStatus::AtRest {
+            run.count_factorisations(found.iterations);
             return Err(failed);
         }
         let state = found.differentiable(self.scene).ok_or(failed)?;
+        run.count_factorisations(state.drape.iterations);
         Ok(End::Rest(Box::new(state)))
     }
 

@@ -5,6 +5,7 @@ use super::point::Point;
 use crate::refit::checkpoint::Checkpoint;
 use crate::refit::{Clock, Observer, Progress};
 use crate::report::Iteration;
+use crate::sim::Drape;
 use crate::sim::drape::DrapeProgress;
 
 /// What changes while searching.
@@ -52,7 +53,7 @@ impl<'a, 'b> Run<'a, 'b> {
         self.notes
     }
 
-    /// Another drape begins.
+    /// A drape begins.
     pub(super) fn count_drape(&mut self) {
         self.drapes += 1;
     }
@@ -62,9 +63,15 @@ impl<'a, 'b> Run<'a, 'b> {
         self.factorisations += count;
     }
 
+    /// Counts a drape that only leads to where another begins.
+    pub(in crate::refit) fn count(&mut self, drape: &Drape) {
+        self.count_drape();
+        self.count_factorisations(drape.iterations);
+    }
+
     /// Tells how a drape proceeds; whether to go on with it. Once stopped, what is left to drape is
     /// draped to its end.
-    pub(super) fn drapes(&mut self, progress: DrapeProgress) -> bool {
+    pub(in crate::refit) fn drapes(&mut self, progress: DrapeProgress) -> bool {
         self.tell(&Progress::Drape(progress))
     }
 
