@@ -372,7 +372,7 @@ mod tests {
                 "key `read.bananas`: there is no such key; known here: `panel_rotation`, \
                  `resolution`",
                 "key `verbosity`: there is no such key; known here: `cage`, `coarse`, `descent`, `fabric`, \
-                 `fabric_zones`, `folds`, `hold`, `loss`, `outline_tolerance`, `read`, `sim`, `symmetry`, `transfer`",
+                 `fabric_zones`, `folds`, `hold`, `loss`, `medium`, `outline_tolerance`, `read`, `sim`, `symmetry`, `transfer`",
             ]
         );
     }
