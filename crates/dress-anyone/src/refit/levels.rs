@@ -10,7 +10,7 @@
 use super::checkpoint::{Checkpoint, Keep};
 use super::flatten::flatten;
 use super::prepare::Prepared;
-use super::search::point::Failed;
+use super::search::point::{ALMOST_AT_REST, Failed};
 use super::search::{Guess, Run, Search, Settled};
 use super::{Clock, Found, Observer, RefitError};
 use crate::body::DistanceField;
@@ -28,9 +28,6 @@ const LET_DOWN: [f64; 3] = [1000.0, 100.0, 10.0];
 const GUIDED_STEPS: usize = 4;
 /// Falls of the loss not worth another step in guided cloth \[–\].
 const GUIDED_TOLERANCE: f64 = 1e-2;
-
-/// Residual at which cloth that is not to be differentiated counts as at rest \[–\].
-const NEARLY: f64 = 0.1;
 
 /// Which mesh of the garment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -159,7 +156,7 @@ fn levels(gradient: Gradient, medium: bool, coarse: bool) -> Vec<Level> {
 fn first_drape(prepared: &Prepared<'_>, run: &mut Run<'_, '_>) -> Result<Vec<Vec3>, RefitError> {
     run.stage("first guess");
     let scene = prepared.scene();
-    let sim = nearly(&scene);
+    let sim = almost(&scene);
     let scene = Scene {
         params: &sim,
         ..scene
@@ -176,7 +173,7 @@ fn let_down(on: &Prepared<'_>, zeta: &[f64], run: &mut Run<'_, '_>) -> Guess {
     for rate in LET_DOWN {
         let free = on.scene();
         let cloth = free.cloth.clone().guided(on.x_star.clone(), rate);
-        let mut sim = nearly(&free);
+        let mut sim = almost(&free);
         sim.equilibrium.iterations = on.params.descent.patience;
         let scene = Scene {
             cloth: &cloth,
@@ -193,11 +190,11 @@ fn let_down(on: &Prepared<'_>, zeta: &[f64], run: &mut Run<'_, '_>) -> Guess {
 }
 
 /// A scene's parameters with drapes that end when they are almost at rest.
-fn nearly(scene: &Scene<'_, DistanceField>) -> SimParams {
+fn almost(scene: &Scene<'_, DistanceField>) -> SimParams {
     let mut sim = *scene.params;
     let rest = &mut sim.equilibrium;
-    rest.tolerance = rest.tolerance.max(NEARLY);
-    rest.polished = rest.polished.max(NEARLY);
+    rest.tolerance = rest.tolerance.max(ALMOST_AT_REST);
+    rest.polished = rest.polished.max(ALMOST_AT_REST);
     sim
 }
 

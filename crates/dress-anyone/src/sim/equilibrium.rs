@@ -51,7 +51,7 @@ impl Default for EquilibriumParams {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum RestStatus {
-    /// The residual is below the tolerance.
+    /// The residual is below the tolerance, or as low as round-off lets it be.
     AtRest,
     /// The largest number of iterations was reached.
     IterationLimit,

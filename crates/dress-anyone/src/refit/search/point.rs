@@ -14,8 +14,9 @@ use crate::sim::equilibrium::RestStatus;
 use crate::sim::{Start, Trajectory, drape};
 use nalgebra::DVector;
 
-/// Residual at which a trial is judged \[–\]: from there to rest the loss changes by a percent or two.
-const JUDGED: f64 = 0.1;
+/// Residual at which cloth is almost at rest \[–\], and a trial judged: from there to rest the loss changes by a
+/// percent or two.
+pub(in crate::refit) const ALMOST_AT_REST: f64 = 0.1;
 
 /// Told how a trial's drape is getting on; whether to go on with it.
 type Judge<'a> = dyn FnMut(DrapeProgress, &dyn Fn() -> Vec<Vec3>) -> bool + 'a;
@@ -156,9 +157,7 @@ impl<'s, S: Surface> Search<'s, S> {
             else {
                 return true;
             };
-            if promising {
-                refused = iteration >= patience;
-            } else if residual < JUDGED {
+            if !promising && residual < ALMOST_AT_REST {
                 let loss = self.losses.evaluate(&x(), &x_bar);
                 promising = self.total(&loss, zeta) < wanted;
                 refused = !promising;
