@@ -3,15 +3,17 @@
 //! Every iteration solves (K + σM) d = f. σ \[1/s²\] starts high, which makes the step a damped,
 //! implicit fall, and goes to zero as the cloth settles, which makes it Newton's. Elements are
 //! clamped to positive semi-definite until the residual is small. Steps must lower the energy, so
-//! the path cannot end on a saddle that the exact stiffness shows.
+//! the path cannot end on a saddle that the exact stiffness shows. Where one leaves large forces in a few
+//! places, their surroundings settle first, by themselves ([`Patch`]).
 
 use super::cloth::Cloth;
 use super::energy::contact::Surface;
 use super::energy::layers::Pair;
 use super::layers::{Layers, hold_apart};
+use super::patch::Patch;
 use super::system::{Assembly, System};
 use crate::geometry::Vec3;
-use crate::geometry::sparse::{Factor, Workspace};
+use crate::geometry::sparse::Workspace;
 use serde::{Deserialize, Serialize};
 
 /// How to look for equilibrium.
@@ -94,28 +96,32 @@ impl Touch {
     /// has room for all that touch.
     pub fn at(cloth: &Cloth, layers: &mut Layers, x: &[Vec3], assembly: Assembly) -> Self {
         let still = vec![Vec3::zeros(); x.len()];
-        let mut touch = Self {
-            pairs: layers.pairs(x, &still, 0.0),
-            assembly,
-        };
-        touch.make_room(cloth, layers, x);
-        touch
+        let pairs = layers.pairs(x, &still, 0.0);
+        let assembly = with_room(assembly, cloth, layers, x, &pairs);
+        Self { pairs, assembly }
     }
+}
 
-    /// Couples all pairs that touch at `x`. Those that nearly touch are taken in along with them,
-    /// so that the structure lasts for a while.
-    fn make_room(&mut self, cloth: &Cloth, layers: &mut Layers, x: &[Vec3]) {
-        let touches = |pair: &Pair| {
-            let corners = pair.vertices.map(|a| x[a as usize]);
-            pair.closest(corners).r.norm() < pair.h
-        };
-        let room = |pair: &Pair| !touches(pair) || self.assembly.couples(pair);
-        if !self.pairs.iter().all(room) {
-            let still = vec![Vec3::zeros(); x.len()];
-            let near = layers.pairs(x, &still, SPARE * layers.thickness());
-            self.assembly = Assembly::coupling(cloth, &near);
-        }
+/// An assembly that couples those of the `pairs` that touch at `x`: the one at hand as long as it has room.
+/// Those that nearly touch are taken in along with them, so that the structure lasts for a while.
+fn with_room(
+    assembly: Assembly,
+    cloth: &Cloth,
+    layers: &mut Layers,
+    x: &[Vec3],
+    pairs: &[Pair],
+) -> Assembly {
+    let touches = |pair: &Pair| {
+        let corners = pair.vertices.map(|a| x[a as usize]);
+        pair.closest(corners).r.norm() < pair.h
+    };
+    let room = |pair: &Pair| !touches(pair) || assembly.couples(pair);
+    if pairs.iter().all(room) {
+        return assembly;
     }
+    let still = vec![Vec3::zeros(); x.len()];
+    let near = layers.pairs(x, &still, SPARE * layers.thickness());
+    Assembly::coupling(cloth, &near)
 }
 
 /// Distance beyond the thickness, as a part of it, at which layers get room in the matrix.
@@ -140,6 +146,13 @@ const LEAST_GROWTH: f64 = 0.05;
 const ROUND_OFF: f64 = 1e-14;
 /// Residual below which energy differences drown in round-off, and the residual itself must fall.
 const ROUND_OFF_BELOW: f64 = 1e-4;
+/// Least part of a step after which a patch may settle: shorter ones fail for another reason.
+const LEAST_PATCHED: f64 = 0.25;
+/// Forces that a patch settles to, as part of those before the step; a step that leaves less needs none.
+const PATCH_TOLERANCE: f64 = 0.3;
+/// Most factorisations of a patch, and the damping it starts with \[1/s²\].
+const PATCH_ITERATIONS: usize = 15;
+const PATCH_SIGMA: f64 = 0.1;
 /// A garment whose centre moves this far \[m\] over [`SLIDE_WINDOW`] late iterations slides.
 const SLIDE: f64 = 0.01;
 /// Iterations over which sliding is judged.
@@ -153,23 +166,30 @@ const SETTLED_AFTER: usize = 100;
 pub fn find<S: Surface>(
     system: &System<'_, S>,
     layers: &mut Layers,
-    mut touch: Touch,
-    mut x: Vec<Vec3>,
+    touch: Touch,
+    x: Vec<Vec3>,
     mut sigma: f64,
     params: &EquilibriumParams,
     observe: &mut dyn FnMut(usize, f64, &[Vec3]) -> bool,
 ) -> Equilibrium {
-    let mut energy = system.energy(&x, &touch.pairs);
-    let mut force = system.force(&x, &touch.pairs);
-    let mut residual = system.residual(&force);
-    let mut exactness: f64 = if residual < EXACT_BELOW { 1.0 } else { 0.0 };
+    let Touch {
+        pairs,
+        mut assembly,
+    } = touch;
+    let mut state = State::at(system, x, pairs);
+    let mut exactness: f64 = if state.residual < EXACT_BELOW {
+        1.0
+    } else {
+        0.0
+    };
     let mut growth = MOST_GROWTH;
-    let mut centres = vec![centre(&x)];
+    let mut centres = vec![centre(&state.x)];
     let mut status = RestStatus::IterationLimit;
     let mut iterations = 0;
     let mut fresh_starts = 0;
     let mut workspace = Workspace::default();
     loop {
+        let residual = state.residual;
         if !residual.is_finite() {
             status = RestStatus::NotFinite;
             break;
@@ -181,12 +201,14 @@ pub fn find<S: Surface>(
         if iterations >= params.iterations {
             break;
         }
-        if !observe(iterations, residual, &x) {
+        if !observe(iterations, residual, &state.x) {
             status = RestStatus::Stopped;
             break;
         }
         iterations += 1;
-        let factor = damped_factor(system, &touch, &x, sigma, exactness, &mut workspace);
+        let mut k = system.stiffness(&assembly, &state.x, &state.pairs, exactness);
+        k.add_diagonal(sigma, &system.rest.mass);
+        let factor = k.factor_in(&mut workspace);
         let Some(factor) = factor else {
             // Less exact is more definite; not exact at all it is indefinite only by round-off.
             if exactness > 0.0 {
@@ -201,7 +223,7 @@ pub fn find<S: Surface>(
             }
             continue;
         };
-        let mut direction = factor.solve(&force);
+        let mut direction = factor.solve(&state.force);
         workspace.recycle(factor);
         let farthest = direction.iter().map(Vec3::norm).fold(0.0, f64::max);
         if !farthest.is_finite() {
@@ -216,117 +238,173 @@ pub fn find<S: Surface>(
         for d in &mut direction {
             *d *= scale;
         }
-        let near = layers.pairs(&x, &direction, 0.0);
-        hold_apart(&near, &x, &mut direction);
-        let Some(step) = line_search(system, &near, &x, &direction, energy, residual) else {
+        let near = layers.pairs(&state.x, &direction, 0.0);
+        hold_apart(&near, &state.x, &mut direction);
+        let found = line_search(system, layers, &state, &direction, &near, params);
+        let Some((next, fraction)) = found else {
             if sigma < MOST_SIGMA {
                 sigma = 10.0 * sigma.max(1.0);
             } else if fresh_starts < FRESH_STARTS {
                 fresh_starts += 1;
                 sigma = params.warm;
                 exactness = 0.0;
-                energy = system.energy(&x, &near);
-                touch.pairs = near;
+                state.energy = system.energy(&state.x, &near);
+                state.pairs = near;
             } else {
                 status = RestStatus::Stalled;
                 break;
             }
             continue;
         };
-        x = step.x;
-        force = step.force;
-        residual = step.residual;
-        energy = step.energy;
-        touch.pairs = near;
-        touch.make_room(system.cloth, layers, &x);
-        if residual >= EXACT_BELOW {
+        state = next;
+        assembly = with_room(assembly, system.cloth, layers, &state.x, &state.pairs);
+        if state.residual >= EXACT_BELOW {
             exactness = 0.0;
         } else {
             exactness = (exactness + growth).min(1.0);
             growth = (1.5 * growth).min(MOST_GROWTH);
         }
-        if step.fraction < 1.0 {
+        if fraction < 1.0 {
             sigma *= 2.0;
         } else if farthest < 10.0 * params.step {
             sigma *= 0.3;
             if sigma < LEAST_SIGMA {
-                sigma = if residual < 1e-2 { 0.0 } else { LEAST_SIGMA };
+                sigma = if state.residual < 1e-2 {
+                    0.0
+                } else {
+                    LEAST_SIGMA
+                };
             }
         }
-        centres.push(centre(&x));
+        centres.push(centre(&state.x));
         if slides(&centres) {
             status = RestStatus::Sliding;
             break;
         }
     }
+    let State {
+        x, residual, pairs, ..
+    } = state;
     Equilibrium {
         x,
         residual,
         iterations,
         status,
-        touch,
+        touch: Touch { pairs, assembly },
     }
 }
 
-/// Factor of K + σM; none when it is not positive definite.
-fn damped_factor<S: Surface>(
-    system: &System<'_, S>,
-    touch: &Touch,
-    x: &[Vec3],
-    sigma: f64,
-    exactness: f64,
-    workspace: &mut Workspace,
-) -> Option<Factor> {
-    let mut k = system.stiffness(&touch.assembly, x, &touch.pairs, exactness);
-    k.add_diagonal(sigma, &system.rest.mass);
-    k.factor_in(workspace)
-}
-
-/// An accepted step.
-struct Step {
+/// A state on the way.
+struct State {
     x: Vec<Vec3>,
+    /// All layers that may touch there, and more.
+    pairs: Vec<Pair>,
+    energy: f64,
     force: Vec<Vec3>,
     residual: f64,
-    energy: f64,
-    fraction: f64,
 }
 
-/// The largest of a few fractions of `direction` that lowers the energy, or — near rest, where
-/// energies cannot tell — the residual.
+impl State {
+    fn at<S: Surface>(system: &System<'_, S>, x: Vec<Vec3>, pairs: Vec<Pair>) -> Self {
+        let energy = system.energy(&x, &pairs);
+        Self::of_energy(energy, system, x, pairs)
+    }
+
+    fn of_energy<S: Surface>(
+        energy: f64,
+        system: &System<'_, S>,
+        x: Vec<Vec3>,
+        pairs: Vec<Pair>,
+    ) -> Self {
+        let force = system.force(&x, &pairs);
+        Self {
+            energy,
+            residual: system.residual(&force),
+            x,
+            pairs,
+            force,
+        }
+    }
+
+    /// How near it is to rest once the patch in which forces are large has settled alone, to forces like
+    /// those of a state of residual `before`; none if forces are large all over.
+    fn with_patch_settled<S: Surface>(
+        &self,
+        system: &System<'_, S>,
+        layers: &mut Layers,
+        before: f64,
+        params: &EquilibriumParams,
+    ) -> Option<Self> {
+        let patch = Patch::about(system, &self.pairs, &self.x, &self.force)?;
+        let small = patch.system(system);
+        let x = patch.cut(&self.x);
+        let mut own = Layers::new(&patch.cloth, *layers.params(), &x);
+        let touch = Touch::at(&patch.cloth, &mut own, &x, Assembly::new(&patch.cloth));
+        let share = system.rest.weight() / small.rest.weight();
+        let params = EquilibriumParams {
+            tolerance: (PATCH_TOLERANCE * before * share).max(params.tolerance),
+            iterations: PATCH_ITERATIONS,
+            ..*params
+        };
+        let found = find(
+            &small,
+            &mut own,
+            touch,
+            x,
+            PATCH_SIGMA,
+            &params,
+            &mut |_, _, _| true,
+        );
+        let mut direction = patch.moves(&self.x, &found.x);
+        let pairs = layers.pairs(&self.x, &direction, 0.0);
+        hold_apart(&pairs, &self.x, &mut direction);
+        Some(Self::at(system, moved(&self.x, &direction, 1.0), pairs))
+    }
+}
+
+/// Where the largest of a few fractions of `direction` leads to that lowers the energy, or — near rest, where
+/// energies cannot tell — the residual; `near` are all layers that it may bring together.
 fn line_search<S: Surface>(
     system: &System<'_, S>,
-    pairs: &[Pair],
-    x: &[Vec3],
+    layers: &mut Layers,
+    from: &State,
     direction: &[Vec3],
-    energy: f64,
-    residual: f64,
-) -> Option<Step> {
+    near: &[Pair],
+    params: &EquilibriumParams,
+) -> Option<(State, f64)> {
     for fraction in [1.0, 0.5, 0.25, 0.1, 0.03] {
-        let moved: Vec<Vec3> = x
-            .iter()
-            .zip(direction)
-            .map(|(p, d)| p + d * fraction)
-            .collect();
-        let new_energy = system.energy(&moved, pairs);
-        let lower = new_energy < energy;
-        let drowned = residual < ROUND_OFF_BELOW && new_energy <= energy + 1e-10 * energy.abs();
-        if !lower && !drowned {
+        let x = moved(&from.x, direction, fraction);
+        let energy = system.energy(&x, near);
+        let lower = energy < from.energy;
+        let drowned =
+            from.residual < ROUND_OFF_BELOW && energy <= from.energy + 1e-10 * from.energy.abs();
+        let patched = !drowned && energy.is_finite() && fraction >= LEAST_PATCHED;
+        if !(lower || drowned || patched) {
             continue;
         }
-        let force = system.force(&moved, pairs);
-        let new_residual = system.residual(&force);
-        if drowned && new_residual >= residual {
-            continue;
+        let step = State::of_energy(energy, system, x, near.to_vec());
+        if patched && !(lower && step.residual < PATCH_TOLERANCE * from.residual) {
+            let settled = step.with_patch_settled(system, layers, from.residual, params);
+            if let Some(settled) = settled.filter(|settled| settled.energy < from.energy) {
+                return Some((settled, fraction));
+            }
         }
-        return Some(Step {
-            x: moved,
-            force,
-            residual: new_residual,
-            energy: new_energy,
-            fraction,
-        });
+        let better = if drowned {
+            step.residual < from.residual
+        } else {
+            lower
+        };
+        if better {
+            return Some((step, fraction));
+        }
     }
     None
+}
+
+/// `x` and a part of a move.
+fn moved(x: &[Vec3], direction: &[Vec3], fraction: f64) -> Vec<Vec3> {
+    let along = x.iter().zip(direction);
+    along.map(|(p, d)| p + d * fraction).collect()
 }
 
 /// Mean position.

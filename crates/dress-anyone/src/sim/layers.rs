@@ -121,6 +121,11 @@ impl Layers {
         self.thickest
     }
 
+    /// How layers meet.
+    pub fn params(&self) -> &LayerParams {
+        &self.params
+    }
+
     /// Whether layers go through each other anywhere.
     pub fn tangled(&self) -> bool {
         self.tangled.contains(&true)

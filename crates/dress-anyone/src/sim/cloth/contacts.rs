@@ -26,6 +26,14 @@ impl ContactPoint {
             .map(|(v, w)| (v as usize, w))
     }
 
+    /// The same point with vertex `number[v]` in place of v; numbers rise with v.
+    pub(in crate::sim) fn renumbered(&self, number: &[u32]) -> Self {
+        Self {
+            corners: self.corners.map(|v| number[v as usize]),
+            ..*self
+        }
+    }
+
     /// Where it is \[m\].
     pub fn at(&self, x: &[Vec3]) -> Vec3 {
         self.parts().map(|(v, w)| x[v] * w).sum()
