@@ -4,7 +4,7 @@
 //! implicit fall, and goes to zero as the cloth settles, which makes it Newton's. Elements are
 //! clamped to positive semi-definite until the residual is small. Steps must lower the energy, so
 //! the path cannot end on a saddle that the exact stiffness shows. Where one leaves large forces in a few
-//! places, their surroundings settle first, by themselves ([`Patch`]).
+//! places, their surroundings settle first, by themselves (`sim/patch.rs`).
 
 use super::cloth::Cloth;
 use super::energy::contact::Surface;

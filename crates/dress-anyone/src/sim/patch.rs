@@ -1,9 +1,9 @@
 //! A patch: the cloth about some of its vertices, cut out to settle by itself while the rest keeps still.
 //!
 //! What keeps a static solve long is folds that form one after the other, in one place each, while every step
-//! has the whole cloth factored: after the first few, nine tenths of a step's forces are in a hundredth of the vertices. So what a step
-//! leaves of large forces is settled first, and then the whole again: nonlinear elimination (Lanzkron, Rose & Wilkes
-//! 1996; Cai & Keyes 2002).
+//! factors the whole cloth: from the tenth step on, 10 to 230 of a T-shirt's 10,351 vertices have forces above a tenth
+//! of the largest. So what a step leaves of large forces is settled first, and then the whole again: nonlinear
+//! elimination (Lanzkron, Rose & Wilkes 1996; Cai & Keyes 2002).
 
 use super::cloth::{Cloth, Fold, Hinge, Hold, Rest};
 use super::energy::friction::Grip;
