@@ -21,8 +21,8 @@ pub(super) struct BodyMap {
     pieces: Vec<Piece>,
     /// Half width of the patch under a point on the surface \[m\].
     width: f64,
-    /// Some of the triangles, all over the body: centre on the source, and moments.
-    samples: Vec<(Vec3, Moments)>,
+    /// Groups of triangles that lie together: centre on the source, and moments.
+    groups: Vec<(Vec3, Moments)>,
     /// Reach of what the body does at large \[m\].
     reach: f64,
 }
@@ -77,8 +77,8 @@ const WIDTH: f64 = 0.015;
 /// How far what the body does at large reaches, as share of its height: 50 cm on an adult, so that
 /// the bulges of a trunk do not count and the turn of an arm does.
 const REACH: f64 = 0.3;
-/// Triangles that tell what the body does at large, about.
-const SAMPLES: usize = 2000;
+/// Groups of triangles that tell what the body does at large, about.
+const GROUPS: usize = 2000;
 /// How much wider the patch grows per distance from the body.
 const SPREAD: f64 = 1.2;
 /// Share of the patch's spread below which a direction counts as across the surface.
@@ -111,16 +111,21 @@ impl BodyMap {
             }
         };
         let pieces = tree.order().iter().map(piece).collect();
-        let centre = |t: usize| before[t].iter().sum::<Vec3>() / 3.0;
-        let stride = (before.len() / SAMPLES).max(1);
+        let group = |triangles: &[u32]| {
+            let (mut centre, mut sum) = (Vec3::zeros(), Moments::NONE);
+            for &t in triangles {
+                centre += before[t as usize].iter().sum::<Vec3>() / 3.0;
+                sum.add(&moments[t as usize], 1.0);
+            }
+            (centre / triangles.len() as f64, sum)
+        };
+        let size = (before.len() / GROUPS).max(1);
+        let groups = tree.order().chunks(size).map(group).collect();
         Self {
             tree,
             pieces,
             width,
-            samples: (0..before.len())
-                .step_by(stride)
-                .map(|t| (centre(t), moments[t]))
-                .collect(),
+            groups,
             reach: REACH * (high - low).max(),
         }
     }
@@ -130,7 +135,7 @@ impl BodyMap {
         let mut reach = self.reach;
         loop {
             let mut sum = Moments::NONE;
-            for (centre, moments) in &self.samples {
+            for (centre, moments) in &self.groups {
                 let nearness = 1.0 - (x - centre).norm_squared() / (reach * reach);
                 if nearness > 0.0 {
                     sum.add(moments, nearness * nearness);

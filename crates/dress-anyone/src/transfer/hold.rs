@@ -12,8 +12,8 @@ use super::TransferParams;
 use super::bind::{Carried, smoothstep};
 use super::draped::Draped;
 use super::relax::{FLEXIBILITY, Hold};
-use crate::geometry::Vec3;
 use crate::geometry::groups::Groups;
+use crate::geometry::{Mat3, Vec3};
 
 /// Cloth this close to the body touches it, and from the second distance on does not, as shares of the body's
 /// height: 4 and 15 mm on an adult.
@@ -46,8 +46,8 @@ pub(super) struct Firmness {
     loose: f64,
     /// Along the body.
     along: f64,
-    /// At right angles to a line, along the body: direction times root.
-    line: Vec3,
+    /// At right angles to lines, along the body.
+    line: Hold,
 }
 
 impl Firmness {
@@ -60,7 +60,7 @@ impl Firmness {
     pub(super) fn loose(&self, across: Vec3) -> Hold {
         Hold::from_diagonal_element(self.along)
             + across * across.transpose() * (self.loose - self.along)
-            + self.line * self.line.transpose()
+            + self.line
     }
 }
 
@@ -88,31 +88,38 @@ pub(super) fn firmness(
         let blend = |from: f64, to: f64, t: f64| from + (to - from) * t;
         let firmness =
             |share: f64| FLEXIBILITY * (draped.sizes[v] / (share * draped.height)).powi(4);
-        let [rim, seam] = [&along_rims, &along_seams].map(|along| along[v].try_normalize(1e-9));
-        let part = if rim.is_some() { RIM } else { 1.0 };
-        let line = rim.or(seam).unwrap_or_else(Vec3::zeros);
+        let on_rim = along_rims[v].trace() > 0.0;
+        let (lines, part) = if on_rim {
+            (along_rims[v], RIM)
+        } else {
+            (along_seams[v], 1.0)
+        };
+        let turned = across[v].cross_matrix();
         let grip = blend(1.0, GRIPPING, rims.grips[v]);
         let drift = blend(SWING, DRIFT, touching[v]);
         Firmness {
             touching: firmness(grip * params.spacing),
             loose: firmness(LOOSE),
             along: firmness(grip * blend(drift.max(params.place), params.place, rims.grips[v])),
-            line: across[v].cross(&line) * firmness(part * params.place).sqrt(),
+            line: turned * lines * turned.transpose() * firmness(part * params.place),
         }
     };
     (0..bound.len()).map(of_one).collect()
 }
 
-/// Directions of these edges at each vertex, where it is carried to; zero at vertices without one.
-fn along(bound: &[Carried], edges: impl Iterator<Item = [u32; 2]>) -> Vec<Vec3> {
-    let mut along = vec![Vec3::zeros(); bound.len()];
+/// Directions d of these edges at each vertex, where it is carried to, as mean of d dᵀ: which end an edge begins at
+/// does not count, and where lines cross both do. Zero at vertices without one.
+fn along(bound: &[Carried], edges: impl Iterator<Item = [u32; 2]>) -> Vec<Mat3> {
+    let mut along = vec![Mat3::zeros(); bound.len()];
     for edge in edges {
         let [a, b] = edge.map(|v| v as usize);
         let side = bound[b].point - bound[a].point;
-        along[a] += side;
-        along[b] += side;
+        for v in [a, b] {
+            along[v] += side * side.transpose();
+        }
     }
-    along
+    let mean = |sum: Mat3| sum / sum.trace().max(f64::MIN_POSITIVE);
+    along.into_iter().map(mean).collect()
 }
 
 /// The rims of a cloth: edges that have one triangle only.
@@ -245,6 +252,26 @@ mod tests {
             assert!((half - 0.5).abs() < 0.12, "{edge} {half}");
             let little = left_of_a_wave(edge, std::f64::consts::TAU * 0.025, &params);
             assert!((little - 1.0 / 17.0).abs() < 0.05, "{edge} {little}");
+        }
+    }
+
+    #[test]
+    fn lines_count_alike_whichever_way_they_run_and_both_where_they_cross() {
+        let bound = |p: Vec3| Carried {
+            point: p,
+            ease: 1.0,
+            normals: [Vec3::y(); 2],
+            map: Mat3::identity(),
+        };
+        let ends = [Vec3::x(), -Vec3::x(), Vec3::z(), -Vec3::z()];
+        let bound: Vec<Carried> = [Vec3::zeros()].into_iter().chain(ends).map(bound).collect();
+        for edges in [
+            [[1, 0], [0, 2], [3, 0], [0, 4]],
+            [[1, 0], [2, 0], [4, 0], [3, 0]],
+        ] {
+            let along = along(&bound, edges.into_iter());
+            assert_eq!(along[0], Mat3::from_diagonal(&Vec3::new(0.5, 0.0, 0.5)));
+            assert_eq!(along[1], Vec3::x() * Vec3::x().transpose());
         }
     }
 }

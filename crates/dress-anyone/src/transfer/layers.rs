@@ -48,8 +48,8 @@ pub(super) fn ties(
             }
             let weights = foot(x[v], corners(&triangle))?;
             let offset = x[v] - weighted(corners(&triangle), weights);
-            let normals = [v, triangle[0] as usize].map(|w| bound[w].normals[0]);
-            let alike = normals[0].dot(&normals[1]) > SAME_SIDE;
+            let below = weighted(triangle.map(|w| bound[w as usize].normals[0]), weights);
+            let alike = bound[v].normals[0].dot(&below) > SAME_SIDE * below.norm();
             let limit = if alike { CLOSE } else { TOUCHING };
             (offset.norm() < limit * height).then_some((offset, triangle, weights))
         });
