@@ -6,7 +6,7 @@ mod fold;
 mod summary;
 
 use crate::geometry::{Vec2, Vec3};
-use crate::pattern::{Pattern, PatternMesh, triangulate};
+use crate::pattern::{Panel, Pattern, PatternMesh, triangulate};
 pub use cut::{Cut, FabricZone, cuts, unknown_panels};
 pub use fold::{FoldLine, PressedFold, fold_lines};
 use serde::{Deserialize, Serialize};
@@ -30,18 +30,18 @@ impl Garment {
     /// Cloth positions of the flat panels as placed around the body \[m\]; sewn vertices take the
     /// mean of their copies.
     pub fn placed(&self) -> Vec<Vec3> {
-        self.moved(|p| p).0
+        self.moved(|_, p| p).0
     }
 
-    /// The cloth with its panels placed and every point moved by `motion`, sewn \[m\]; and the rest
+    /// The cloth with its panels placed and every point of each moved by `motion`, sewn \[m\]; and the rest
     /// shape that would lie so but for what leaves the panels' planes.
-    pub fn moved(&self, motion: impl Fn(Vec3) -> Vec3) -> (Vec<Vec3>, Vec<Vec2>) {
+    pub fn moved(&self, motion: impl Fn(&Panel, Vec3) -> Vec3) -> (Vec<Vec3>, Vec<Vec2>) {
         let mut placed = vec![Vec3::zeros(); self.mesh.x_bar.len()];
         let mut flat = self.mesh.x_bar.clone();
         for (panel, range) in self.pattern.panels.iter().zip(&self.mesh.panel_vertices) {
             for v in range.clone() {
                 let p = panel.placement.place(self.mesh.x_bar[v]);
-                placed[v] = motion(p);
+                placed[v] = motion(panel, p);
                 if placed[v] != p {
                     flat[v] = panel.placement.flatten(placed[v]);
                 }

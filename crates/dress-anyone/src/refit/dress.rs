@@ -1,5 +1,6 @@
 //! A garment put on a body: what holds it up, and its drape from the placed panels.
 
+mod clear;
 mod coarse;
 mod placed;
 
@@ -96,8 +97,9 @@ fn is_held(edge: &Edge, params: &HoldParams) -> bool {
 }
 
 /// Drapes a garment from its placed panels on `body`, or — when it brought a drape — from there. What
-/// slides off is draped again held by its upper rim, if its pattern has no labels that would say what
-/// is held, or else with friction; where that does not help, it slides.
+/// slides off, or comes to rest far below where it was placed, is draped again held by its upper rim, if its
+/// pattern has no labels that would say what is held, or else with friction; where that does not help, it
+/// slides.
 pub fn drape_on(
     garment: &Garment,
     body: &Body,
@@ -137,10 +139,10 @@ pub fn drape_on(
     } else {
         return found;
     };
-    if again.status == RestStatus::AtRest {
-        again
-    } else {
+    if again.status == RestStatus::Sliding {
         found
+    } else {
+        again
     }
 }
 

@@ -73,7 +73,8 @@ impl Drape {
             for d in &mut kick {
                 *d *= KICK;
             }
-            hold_apart(&self.layers.pairs(&self.x, &kick, 0.0), &self.x, &mut kick);
+            let near = self.layers.pairs(&self.x, &kick, 0.0);
+            hold_apart(&near, &self.x, &mut kick, 0.0);
             for (x, d) in self.x.iter_mut().zip(kick) {
                 *x += d;
             }

@@ -256,6 +256,9 @@ const INFLATED: f64 = 0.7;
 const GROWING: [f64; 2] = [0.3, 0.8];
 /// Rest shapes on the way.
 const STAGES: usize = 16;
+/// Gathering times that are spent on layers which go through each other: armpits, where the body presses,
+/// take long to untangle.
+const UNTANGLING: usize = 8;
 
 /// The rest from `short` to `x_bar` in stages; one stage if there is nothing to grow.
 fn growth(cloth: &Cloth, short: &[Vec2], x_bar: &[Vec2]) -> Vec<Rest> {
@@ -288,7 +291,7 @@ fn gather<S: Surface>(
     let v = vec![Vec3::zeros(); x.len()];
     let mut state = State { x, v };
     let steps = step_params.steps();
-    for step in 0..2 * steps {
+    for step in 0..UNTANGLING * steps {
         let enough = step >= steps && !stepper.tangled();
         let progress = DrapeProgress::Gathering { step, steps };
         if enough || !observe(progress, &|| state.x.clone()) {

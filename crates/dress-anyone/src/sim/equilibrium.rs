@@ -6,6 +6,8 @@
 //! the path cannot end on a saddle that the exact stiffness shows. Where one leaves large forces in a few
 //! places, their surroundings settle first, by themselves (`sim/patch.rs`).
 
+mod slide;
+
 use super::cloth::Cloth;
 use super::energy::contact::Surface;
 use super::energy::layers::Pair;
@@ -15,6 +17,7 @@ use super::system::{Assembly, System};
 use crate::geometry::Vec3;
 use crate::geometry::sparse::Workspace;
 use serde::{Deserialize, Serialize};
+use slide::Late;
 
 /// How to look for equilibrium.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -57,7 +60,7 @@ pub enum RestStatus {
     AtRest,
     /// The largest number of iterations was reached.
     IterationLimit,
-    /// The garment still moves as a whole: nothing holds it.
+    /// The garment still falls, most of it: nothing holds it.
     Sliding,
     /// No step lowers the energy any more, though the residual is above the tolerance.
     Stalled,
@@ -153,12 +156,6 @@ const PATCH_TOLERANCE: f64 = 0.3;
 /// Most factorisations of a patch, and the damping it starts with \[1/s²\].
 const PATCH_ITERATIONS: usize = 15;
 const PATCH_SIGMA: f64 = 0.1;
-/// A garment whose centre moves this far \[m\] over [`SLIDE_WINDOW`] late iterations slides.
-const SLIDE: f64 = 0.01;
-/// Iterations over which sliding is judged.
-const SLIDE_WINDOW: usize = 10;
-/// Sliding is judged only after this many iterations.
-const SETTLED_AFTER: usize = 100;
 
 /// Finds the equilibrium near `x`, where layers touch as `touch` says, starting with damping `sigma`.
 /// `observe` is told the iteration, the residual and the positions, and may ask to stop by returning
@@ -183,7 +180,7 @@ pub fn find<S: Surface>(
         0.0
     };
     let mut growth = MOST_GROWTH;
-    let mut centres = vec![centre(&state.x)];
+    let mut late = Late::new(&state.x);
     let mut status = RestStatus::IterationLimit;
     let mut iterations = 0;
     let mut fresh_starts = 0;
@@ -239,7 +236,7 @@ pub fn find<S: Surface>(
             *d *= scale;
         }
         let near = layers.pairs(&state.x, &direction, 0.0);
-        hold_apart(&near, &state.x, &mut direction);
+        hold_apart(&near, &state.x, &mut direction, 0.0);
         let found = line_search(system, layers, &state, &direction, &near, params);
         let Some((next, fraction)) = found else {
             if sigma < MOST_SIGMA {
@@ -276,8 +273,7 @@ pub fn find<S: Surface>(
                 };
             }
         }
-        centres.push(centre(&state.x));
-        if slides(&centres) {
+        if late.slides(&state.x) {
             status = RestStatus::Sliding;
             break;
         }
@@ -357,7 +353,7 @@ impl State {
         );
         let mut direction = patch.moves(&self.x, &found.x);
         let pairs = layers.pairs(&self.x, &direction, 0.0);
-        hold_apart(&pairs, &self.x, &mut direction);
+        hold_apart(&pairs, &self.x, &mut direction, 0.0);
         Some(Self::at(system, moved(&self.x, &direction, 1.0), pairs))
     }
 }
@@ -405,15 +401,4 @@ fn line_search<S: Surface>(
 fn moved(x: &[Vec3], direction: &[Vec3], fraction: f64) -> Vec<Vec3> {
     let along = x.iter().zip(direction);
     along.map(|(p, d)| p + d * fraction).collect()
-}
-
-/// Mean position.
-fn centre(x: &[Vec3]) -> Vec3 {
-    x.iter().sum::<Vec3>() / x.len() as f64
-}
-
-/// Whether the garment's centre keeps moving late in the search.
-fn slides(centres: &[Vec3]) -> bool {
-    let n = centres.len();
-    n > SETTLED_AFTER && (centres[n - 1] - centres[n - 1 - SLIDE_WINDOW]).norm() > SLIDE
 }

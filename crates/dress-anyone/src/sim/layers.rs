@@ -1,4 +1,4 @@
-//! Which pieces of cloth may meet: broad phase, what is exempt, and moves that pass through nothing.
+//! Which pieces of cloth may meet: broad phase, and what is exempt.
 //!
 //! Vertices are tested against triangles and edges against edges, over trees of boxes that enclose
 //! their whole move. Pieces that are sewn together, or within twice the contact thickness of each
@@ -6,10 +6,9 @@
 //! other already ([`crate::geometry::intersections`]): holding these apart would hold them where
 //! they are.
 //!
-//! No layer passes another in a move that [`hold_apart`] has shortened: each pair of convex pieces
-//! is parted by a plane half way between its closest points, and no vertex reaches that plane (cf.
-//! Chen et al. 2025, Offset Geometric Contact, whose bounds are balls instead).
+//! Moves that pass through nothing: `hold_apart`.
 
+mod hold_apart;
 mod stepping;
 mod untangle;
 
@@ -17,6 +16,7 @@ use super::cloth::Cloth;
 use super::energy::layers::{Kind, LEAST_THICKNESS, LayerParams, Pair};
 use crate::geometry::box_tree::{Aabb, BoxTree, around};
 use crate::geometry::{Vec3, intersections};
+pub use hold_apart::hold_apart;
 use std::collections::BTreeMap;
 pub use stepping::Watch;
 
@@ -297,116 +297,12 @@ const ROOM: f64 = 0.3;
 /// Room as part of the farthest move, so that what was found serves for a few moves.
 const MOVES_OF_ROOM: f64 = 3.0;
 
-/// Part of the way to the parting plane that a vertex may go.
-const SHARE: f64 = 0.9;
-/// Passes in which the parting planes may move along with the cloth.
-const MOVING_PASSES: usize = 3;
-
-/// Shortens the move `d` from `x` of single vertices, so that no layer passes through another.
-/// `pairs` are all that the move could bring together. Whether anything was shortened.
-///
-/// The parting planes move along with the mean of their pair, so that layers fall together. Where
-/// that does not work out, because a vertex is held back elsewhere, planes stand still in the end.
-pub fn hold_apart(pairs: &[Pair], x: &[Vec3], d: &mut [Vec3]) -> bool {
-    let planes: Vec<Plane> = (pairs.iter())
-        .filter_map(|pair| Plane::between(pair, x, d))
-        .collect();
-    let mut any = false;
-    for pass in 0..=MOVING_PASSES {
-        let mut parts = vec![1.0_f64; d.len()];
-        let mut parted = true;
-        for plane in &planes {
-            let Plane {
-                vertices,
-                n,
-                rooms,
-                signs,
-            } = plane;
-            let moves = vertices.map(|v| n.dot(&d[v]));
-            let plane = if pass < MOVING_PASSES {
-                0.25 * moves.iter().sum::<f64>()
-            } else {
-                0.0
-            };
-            for k in 0..4 {
-                let (room, sign) = (rooms[k], signs[k]);
-                if (moves[k] - plane) * sign > SHARE * room {
-                    // The plane's own move is given; what is left of the room is the vertex's.
-                    let own = moves[k] * sign;
-                    let allowed = SHARE * room + plane * sign;
-                    // One that flees too slowly is passed by the plane: that takes a still one.
-                    let part = if own > 0.0 {
-                        (allowed / own).max(0.0)
-                    } else {
-                        1.0
-                    };
-                    parts[vertices[k]] = parts[vertices[k]].min(part);
-                    parted = false;
-                }
-            }
-        }
-        if parted {
-            break;
-        }
-        any = true;
-        for (d, part) in d.iter_mut().zip(parts) {
-            *d *= part;
-        }
-    }
-    any
-}
-
-/// The plane half way between the closest points of a pair.
-struct Plane {
-    vertices: [usize; 4],
-    n: Vec3,
-    /// Which way along n each vertex comes to the plane, and how far that is \[m\].
-    signs: [f64; 4],
-    rooms: [f64; 4],
-}
-
-impl Plane {
-    /// None where the moves `d` are too short to reach it, whatever part of them is taken: they then
-    /// stay within a share of half the distance, even where the plane moves as far.
-    fn between(pair: &Pair, x: &[Vec3], d: &[Vec3]) -> Option<Self> {
-        let vertices = pair.vertices.map(|v| v as usize);
-        let at = vertices.map(|v| x[v]);
-        let closest = pair.closest(at);
-        let delta = closest.r.norm();
-        let farthest = vertices.map(|v| d[v].norm_squared());
-        let farthest = farthest.into_iter().fold(0.0, f64::max).sqrt();
-        if !(0.0 < delta && SHARE * delta < 4.0 * farthest) {
-            return None;
-        }
-        let n = closest.r / delta;
-        let heights = at.map(|p| n.dot(&p));
-        let middle = middle(pair.kind, &closest.beta, &heights);
-        let sign = |k| if first_side(pair.kind, k) { -1.0 } else { 1.0 };
-        let signs: [f64; 4] = std::array::from_fn(sign);
-        Some(Self {
-            vertices,
-            n,
-            signs,
-            rooms: std::array::from_fn(|k| (middle - heights[k]) * signs[k]),
-        })
-    }
-}
-
 /// Whether corner `k` of a pair belongs to its first piece.
 fn first_side(kind: Kind, k: usize) -> bool {
     match kind {
         Kind::PointTriangle => k == 0,
         Kind::EdgeEdge(_) => k < 2,
     }
-}
-
-/// Height half way between the closest points.
-fn middle(kind: Kind, beta: &[f64; 4], heights: &[f64; 4]) -> f64 {
-    let mean = |k: usize| {
-        let sign = if first_side(kind, k) { 0.5 } else { -0.5 };
-        sign * beta[k] * heights[k]
-    };
-    (0..4).map(mean).sum()
 }
 
 /// The most by which a point of one piece moves against a point of the other.

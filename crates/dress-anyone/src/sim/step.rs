@@ -46,7 +46,7 @@ pub struct StepParams {
     /// of layers 20 Pa keep most layers of sleeves and legs apart; with it there is no need, and wide
     /// skirts fly up. A cloth of 0.2 kg/m² weighs 2 Pa. The paper has none.
     pub inflation: f64,
-    /// Simulated time \[s\] before the static solve takes over; up to twice as long while layers
+    /// Simulated time \[s\] before the static solve takes over; up to eight times as long while layers
     /// still go through each other.
     pub time: f64,
 }

@@ -4,7 +4,8 @@
 //! Closing seams and falling takes as many steps in any mesh, and a coarse one does them for a small
 //! part of the price. What it ends with needs to be near a state of rest only; the fine mesh's own
 //! static solve decides. Where the coarse cloth does not come to rest, or the carried one goes
-//! through itself, the fine mesh starts from its panels after all.
+//! through itself, the fine mesh starts from its panels after all. What slides off in a coarse mesh would
+//! in the fine one.
 
 use super::Dressing;
 use super::placed::placed;
@@ -23,7 +24,12 @@ const LEAST: usize = 400;
 /// more, and its forces are small beside those that the finer mesh begins with.
 const NEAR_REST: f64 = 1.0;
 
-/// Drapes from the placed panels.
+/// Fall of a vertex that comes off the body with its garment \[m\], and how large a part of the vertices
+/// then falls so far: a hood alone may, and so may the sides of a skirt.
+const FALLEN: f64 = 0.3;
+const MOST: f64 = 0.75;
+
+/// Drapes from the placed panels. What comes to rest far below where it was placed counts as sliding.
 pub(super) fn from_panels(
     on: &Dressing<'_>,
     garment: &Garment,
@@ -50,6 +56,19 @@ pub(super) fn from_panels(
             observe(progress, &|| carry(&x()))
         });
         let carried = carry(&found.x);
+        if found.status == RestStatus::Sliding {
+            let mut drape = on.drape(
+                garment,
+                &placed,
+                carried,
+                Start::Near,
+                &without_iterations(sim),
+                &mut observe,
+            );
+            drape.iterations = found.iterations;
+            drape.status = RestStatus::Sliding;
+            return drape;
+        }
         let apart = || intersections::within(&carried, &garment.mesh.cloth_triangles()).is_empty();
         if found.status == RestStatus::AtRest && apart() {
             let mut drape = on.drape(garment, &placed, carried, Start::Near, sim, &mut observe);
@@ -58,7 +77,33 @@ pub(super) fn from_panels(
         }
     }
     let start = Start::Placed { short };
-    on.drape(garment, &placed, placed.clone(), start, sim, &mut observe)
+    let mut drape = on.drape(garment, &placed, placed.clone(), start, sim, &mut observe);
+    let ended = [
+        RestStatus::AtRest,
+        RestStatus::Stalled,
+        RestStatus::IterationLimit,
+    ];
+    if ended.contains(&drape.status) && fell(&placed, &drape.x) {
+        drape.status = RestStatus::Sliding;
+    }
+    drape
+}
+
+/// A search that only tells the residual.
+fn without_iterations(sim: &SimParams) -> SimParams {
+    SimParams {
+        equilibrium: EquilibriumParams {
+            iterations: 0,
+            ..sim.equilibrium
+        },
+        ..*sim
+    }
+}
+
+/// Whether a garment at `x` has come off the body around which it was placed.
+fn fell(placed: &[Vec3], x: &[Vec3]) -> bool {
+    let fallen = placed.iter().zip(x).filter(|(p, x)| p.y - x.y > FALLEN);
+    fallen.count() as f64 > MOST * x.len() as f64
 }
 
 /// The garment in a coarser mesh; none if it has few vertices, cannot be meshed so coarsely, or is
@@ -97,6 +142,19 @@ mod tests {
         let ratio = count as f64 / coarse.mesh.cloth_vertex_count as f64;
         // Boundaries count more in a coarse mesh.
         assert!((0.8..1.2).contains(&(ratio / COARSENING as f64)), "{ratio}");
+    }
+
+    #[test]
+    fn a_garment_has_come_off_when_most_of_it_lies_far_below() {
+        let placed = vec![Vec3::zeros(); 100];
+        // A hood, a third of the garment, lies on the back; trousers lie about the feet.
+        let fallen =
+            |count: usize| (0..100).map(move |v| Vec3::y() * if v < count { -0.4 } else { 0.0 });
+        assert!(!fell(&placed, &fallen(33).collect::<Vec<_>>()));
+        assert!(fell(&placed, &fallen(90).collect::<Vec<_>>()));
+        // A loose waist comes down to the hips.
+        let sunk: Vec<Vec3> = placed.iter().map(|p| p - Vec3::y() * 0.2).collect();
+        assert!(!fell(&placed, &sunk));
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! Where the panels of a garment start around a body, and how short.
 
+use super::clear::{Hanging, out_of};
 use crate::body::Body;
 use crate::garment::Garment;
 use crate::geometry::{Vec2, Vec3};
@@ -35,24 +36,30 @@ fn heights(garment: &Garment) -> (f64, f64) {
     })
 }
 
-/// The panels placed on `body` \[m\], and the rest shape to begin with: what would start about the feet
-/// or below the soles, where it would be caught, is shortened into the space between instep and knee.
+/// The panels placed on `body` \[m\], and the rest shape to begin with: what would start in the body waits in
+/// front of it, skirts hang below the arms, and what would start about the feet or below the soles, where it
+/// would be caught, is shortened into the space between instep and knee.
 pub(super) fn placed(garment: &Garment, body: &Body) -> (Vec<Vec3>, Vec<Vec2>) {
     let mut garment = garment.clone();
     let up = lift(&garment, body);
     for panel in &mut garment.pattern.panels {
         panel.placement.translation.y += up;
     }
+    out_of(body, &mut garment);
+    let hanging = Hanging::below_arms(body, &garment);
     let (floor, top) = body.mesh.bounds();
     let at = |part: f64| floor.y + part * (top.y - floor.y);
     let (instep, knee) = (at(INSTEP), at(KNEE));
-    let (lowest, _) = heights(&garment);
-    if lowest >= instep {
-        return (garment.placed(), garment.mesh.x_bar);
-    }
-    let shorter = (knee - instep) / (knee - lowest);
-    garment.moved(|p| {
-        let y = if p.y < knee {
+    let (hung, _) = garment.moved(|panel, p| hanging.start(panel, p));
+    let lowest = hung.iter().map(|p| p.y).fold(f64::INFINITY, f64::min);
+    let shorter = if lowest < instep {
+        (knee - instep) / (knee - lowest)
+    } else {
+        1.0
+    };
+    garment.moved(|panel, p| {
+        let p = hanging.start(panel, p);
+        let y = if p.y < knee && shorter < 1.0 {
             knee - shorter * (knee - p.y)
         } else {
             p.y
@@ -87,10 +94,10 @@ mod tests {
     use crate::geometry::TriangleMesh;
     use approx::assert_relative_eq;
 
-    /// A box of 1.2 m that stands at a height.
+    /// A box of 1.2 m that stands at a height, between the panels.
     fn body(floor: f64) -> Body {
         let mut mesh = TriangleMesh::default();
-        add_box(&mut mesh, [-0.2, floor, -0.2], [0.2, floor + 1.2, 0.2]);
+        add_box(&mut mesh, [-0.2, floor, -0.05], [0.2, floor + 1.2, 0.05]);
         Body {
             name: "box".to_owned(),
             mesh,

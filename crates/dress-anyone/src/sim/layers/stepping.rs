@@ -28,6 +28,10 @@ pub struct Watch {
 
 /// Room as part of the mean move of a step, so that pairs last for a few steps.
 const STEPS_OF_ROOM: f64 = 4.0;
+/// Part of the distance at which layers begin to feel each other to which no step brings them closer: steps
+/// that press on would cut what is left to a tenth again and again, until nothing could tell that they are
+/// apart. In the static solve their energy, which has no bound, keeps them from it.
+pub(super) const LEAST_GAP: f64 = 1e-2;
 /// Steps between looks for tangles.
 const LOOK: usize = 10;
 /// Farthest that a step pushes tangled layers back, in thicknesses.
@@ -129,7 +133,7 @@ impl Watch {
                 *d *= left / length;
             }
         }
-        hold_apart(&self.pairs, before, &mut moves_of_own);
+        hold_apart(&self.pairs, before, &mut moves_of_own, LEAST_GAP);
         for ((x, b), d) in x.iter_mut().zip(before).zip(moves_of_own) {
             *x = b + mean + d;
         }
