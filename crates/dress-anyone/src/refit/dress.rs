@@ -139,10 +139,11 @@ pub fn drape_on(
     } else {
         return found;
     };
-    if again.status == RestStatus::Sliding {
-        found
-    } else {
+    let nearer_to_rest = again.status != RestStatus::Sliding && again.residual < found.residual;
+    if again.status == RestStatus::AtRest || nearer_to_rest {
         again
+    } else {
+        found
     }
 }
 
