@@ -16,7 +16,6 @@ pub mod energy;
 pub mod equilibrium;
 pub mod layers;
 pub mod material;
-mod patch;
 #[cfg(test)]
 mod properties;
 pub mod step;

@@ -4,18 +4,19 @@
 //! implicit fall, and goes to zero as the cloth settles, which makes it Newton's. Elements are
 //! clamped to positive semi-definite until the residual is small. Steps must lower the energy, so
 //! the path cannot end on a saddle that the exact stiffness shows. Where one leaves large forces in a few
-//! places, their surroundings settle first, by themselves (`sim/patch.rs`).
+//! places, their surroundings settle first, by themselves (`equilibrium/patch.rs`).
 
+mod patch;
 mod slide;
 
 use super::cloth::Cloth;
 use super::energy::contact::Surface;
 use super::energy::layers::Pair;
 use super::layers::{Layers, hold_apart};
-use super::patch::Patch;
 use super::system::{Assembly, System};
 use crate::geometry::Vec3;
 use crate::geometry::sparse::Workspace;
+use patch::Patch;
 use serde::{Deserialize, Serialize};
 use slide::Late;
 
@@ -322,8 +323,8 @@ impl State {
         }
     }
 
-    /// How near it is to rest once the patch in which forces are large has settled alone, to forces like
-    /// those of a state of residual `before`; none if forces are large all over.
+    /// The same once the patch in which forces are large has settled alone, to forces like those of a state of
+    /// residual `before`; none if there is no such patch.
     fn with_patch_settled<S: Surface>(
         &self,
         system: &System<'_, S>,
@@ -374,12 +375,12 @@ fn line_search<S: Surface>(
         let lower = energy < from.energy;
         let drowned =
             from.residual < ROUND_OFF_BELOW && energy <= from.energy + 1e-10 * from.energy.abs();
-        let patched = !drowned && energy.is_finite() && fraction >= LEAST_PATCHED;
-        if !(lower || drowned || patched) {
+        let may_settle = !drowned && energy.is_finite() && fraction >= LEAST_PATCHED;
+        if !(lower || drowned || may_settle) {
             continue;
         }
         let step = State::of_energy(energy, system, x, near.to_vec());
-        if patched && !(lower && step.residual < PATCH_TOLERANCE * from.residual) {
+        if may_settle && !(lower && step.residual < PATCH_TOLERANCE * from.residual) {
             let settled = step.with_patch_settled(system, layers, from.residual, params);
             if let Some(settled) = settled.filter(|settled| settled.energy < from.energy) {
                 return Some((settled, fraction));

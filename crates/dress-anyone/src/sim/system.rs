@@ -1,6 +1,9 @@
 //! The total energy U(x; x̄) of cloth on a body, its force and stiffness (METHOD §1.4: membrane,
 //! bending, contact, holds, weight), assembled from the pieces of [`super::energy`].
 
+#[cfg(test)]
+pub(crate) mod fixtures;
+
 use super::cloth::{Cloth, ContactPoint, GRAVITY, Hinge, Rest};
 use super::energy::contact::{self, ContactParams, Surface};
 use super::energy::friction::Grip;
@@ -316,10 +319,10 @@ impl<S: Surface> System<'_, S> {
 
 #[cfg(test)]
 mod tests {
+    use super::fixtures::ActedOn;
     use super::*;
     use crate::check::{assert_derivative, noise};
-    use crate::sim::cloth::{Hold, fixtures};
-    use crate::sim::energy::contact::fixtures::Cone;
+    use crate::sim::cloth::fixtures;
     use crate::sim::energy::layers::LayerParams;
     use crate::sim::layers::Layers;
     use crate::sim::material::OrFabric;
@@ -327,40 +330,8 @@ mod tests {
     #[test]
     fn force_and_stiffness_are_derivatives_of_the_energy() {
         let mesh = fixtures::tube(10, 4, 0.06);
-        let mut cloth = fixtures::creased(&mesh);
-        cloth.holds.push(Hold {
-            vertex: 3,
-            height: 0.1,
-            stiffness: 40.0,
-        });
-        let cloth = cloth.guided(fixtures::rolled(&mesh, 0.61, 0.09), 1e4);
-        let rest = cloth.at_rest(&mesh.x_bar);
-        let surface = Cone {
-            radius: 0.09,
-            slope: 0.2,
-            flat: 1.1,
-            lean: 0.2,
-        };
-        let contact = ContactParams {
-            thickness: 0.02,
-            stiffness: 1e4,
-            friction: OrFabric::Number(0.0),
-        };
-        let mut x = fixtures::rolled(&mesh, 0.6, 0.092);
-        let mut grips = vec![Grip::default(); cloth.contacts.len()];
-        for (grip, point) in grips.iter_mut().zip(&cloth.contacts) {
-            grip.look(&surface, 0.3, [1e4 * point.area, 0.02], point.at(&x));
-        }
-        let system = System {
-            cloth: &cloth,
-            rest: &rest,
-            surface: &surface,
-            contact,
-            grips: &grips,
-        };
-        for (i, p) in x.iter_mut().enumerate() {
-            *p += Vec3::from_fn(|c, _| 0.004 * noise(3 * i + c));
-        }
+        let scene = ActedOn::new(&mesh, &[3], 0.004);
+        let (system, cloth, x) = (scene.system(), &scene.cloth, &scene.x);
         let d: Vec<Vec3> = (0..x.len())
             .map(|i| Vec3::from_fn(|c, _| noise(900 + 3 * i + c)))
             .collect();
@@ -377,18 +348,18 @@ mod tests {
         for p in &mut without_neighbours.reference {
             *p *= 3.0;
         }
-        let mut layers = Layers::new(&without_neighbours, layers, &x);
-        let pairs = layers.pairs(&x, &d.iter().map(|d| d * 1e-3).collect::<Vec<_>>(), 0.0);
-        let assembly = Assembly::coupling(&cloth, &pairs);
+        let mut layers = Layers::new(&without_neighbours, layers, x);
+        let pairs = layers.pairs(x, &d.iter().map(|d| d * 1e-3).collect::<Vec<_>>(), 0.0);
+        let assembly = Assembly::coupling(cloth, &pairs);
         let touching = pairs.iter().filter(|pair| {
             let corners = pair.vertices.map(|a| x[a as usize]);
             pair.energy(corners) > 0.0
         });
         assert!(touching.count() > 20);
 
-        let slope = -dot(&system.force(&x, &pairs), &d);
+        let slope = -dot(&system.force(x, &pairs), &d);
         assert_derivative(|s| system.energy(&at(s), &pairs), slope, 1e-6, 1e-3, 1e-6);
-        let kd = system.stiffness(&assembly, &x, &pairs, 1.0).multiply(&d);
+        let kd = system.stiffness(&assembly, x, &pairs, 1.0).multiply(&d);
         let q: Vec<Vec3> = (0..x.len())
             .map(|i| Vec3::from_fn(|c, _| noise(70 + 5 * i + c)))
             .collect();

@@ -236,7 +236,7 @@ mod tests {
     }
 
     #[test]
-    fn a_skirt_over_the_arms_is_turned_down_below_them_and_trousers_are_not() {
+    fn a_skirt_over_the_arms_is_turned_down_below_them_and_what_is_not_for_legs_stays() {
         // A trunk, and an arm 40 cm beside its middle that hangs to half its height.
         let trunk = [[-0.15, -1.0, -0.1], [0.15, 1.0, 0.1]];
         let arm = |side: f64| {

@@ -5,11 +5,11 @@
 //! of the largest. So what a step leaves of large forces is settled first, and then the whole again: nonlinear
 //! elimination (Lanzkron, Rose & Wilkes 1996; Cai & Keyes 2002).
 
-use super::cloth::{Cloth, Fold, Hinge, Hold, Rest};
-use super::energy::friction::Grip;
-use super::energy::layers::Pair;
-use super::system::System;
 use crate::geometry::Vec3;
+use crate::sim::cloth::{Cloth, Fold, Hinge, Hold, Rest};
+use crate::sim::energy::friction::Grip;
+use crate::sim::energy::layers::Pair;
+use crate::sim::system::System;
 
 /// Cloth cut out of a larger one, with all that acts on the vertices that are free.
 pub(super) struct Patch {
@@ -37,7 +37,8 @@ const LARGEST: f64 = 0.25;
 const SMALLEST: usize = 2000;
 
 impl Patch {
-    /// The surroundings of the vertices with large forces `f` at `x`; none if these are not a small part of the cloth.
+    /// The surroundings of the vertices with large forces `f` at `x`; none if these are not a small
+    /// part of the cloth, or it has few vertices anyhow.
     pub(super) fn about<S>(
         system: &System<'_, S>,
         pairs: &[Pair],
@@ -64,12 +65,12 @@ impl Patch {
                 }
             }
         };
-        system.cloth.hinges.iter().for_each(|h| take(&h.vertices));
-        system
-            .cloth
-            .folds
-            .iter()
-            .for_each(|f| take(&f.hinge.vertices));
+        for hinge in &system.cloth.hinges {
+            take(&hinge.vertices);
+        }
+        for fold in &system.cloth.folds {
+            take(&fold.hinge.vertices);
+        }
         for pair in pairs {
             take(&pair.vertices);
         }
@@ -227,78 +228,43 @@ fn grown(marked: &[bool], cloth: &Cloth) -> Vec<bool> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::check::noise;
     use crate::sim::cloth::fixtures;
-    use crate::sim::energy::contact::ContactParams;
-    use crate::sim::energy::contact::fixtures::Cone;
     use crate::sim::energy::layers::LayerParams;
     use crate::sim::layers::Layers;
     use crate::sim::material::OrFabric;
+    use crate::sim::system::fixtures::ActedOn;
     use approx::assert_relative_eq;
 
     #[test]
     fn forces_on_free_vertices_are_those_of_the_whole_and_the_rim_keeps_still() {
         let mesh = fixtures::tube(70, 30, 0.01);
-        let mut cloth = fixtures::creased(&mesh);
-        let hold = |vertex| Hold {
-            vertex,
-            height: 0.1,
-            stiffness: 40.0,
-        };
-        cloth.holds.extend([700, 705].map(hold));
-        let cloth = cloth.guided(fixtures::rolled(&mesh, 0.61, 0.09), 1e3);
-        let rest = cloth.at_rest(&mesh.x_bar);
-        let surface = Cone {
-            radius: 0.09,
-            slope: 0.2,
-            flat: 1.1,
-            lean: 0.2,
-        };
-        let contact = ContactParams {
-            thickness: 0.02,
-            stiffness: 1e4,
-            friction: OrFabric::Number(0.0),
-        };
-        let mut x = fixtures::rolled(&mesh, 0.6, 0.092);
-        let mut grips = vec![Grip::default(); cloth.contacts.len()];
-        for (grip, point) in grips.iter_mut().zip(&cloth.contacts) {
-            grip.look(&surface, 0.3, [1e4 * point.area, 0.02], point.at(&x));
-        }
-        let system = System {
-            cloth: &cloth,
-            rest: &rest,
-            surface: &surface,
-            contact,
-            grips: &grips,
-        };
-        for (i, p) in x.iter_mut().enumerate() {
-            *p += Vec3::from_fn(|c, _| 5e-4 * noise(3 * i + c));
-        }
+        let scene = ActedOn::new(&mesh, &[700, 705], 5e-4);
+        let (system, x) = (scene.system(), &scene.x);
         // Neighbours farther along the mesh than twice 6 mm touch, as layers would.
         let layers = LayerParams {
             thickness: OrFabric::Number(0.006),
             ..LayerParams::default()
         };
         let still = vec![Vec3::zeros(); x.len()];
-        let pairs = Layers::new(&cloth, layers, &x).pairs(&x, &still, 0.0);
+        let pairs = Layers::new(&scene.cloth, layers, x).pairs(x, &still, 0.0);
 
         let mut large = still.clone();
         large[703] = Vec3::x();
-        let patch = Patch::about(&system, &pairs, &x, &large).expect("a small part");
-        let own = patch.cut(&x);
+        let patch = Patch::about(&system, &pairs, x, &large).expect("a small part");
+        let own = patch.cut(x);
         let small = patch.system(&system);
         let pairs_inside = Layers::new(&patch.cloth, layers, &own).pairs(
             &own,
             &vec![Vec3::zeros(); own.len()],
             0.0,
         );
-        let (whole, part) = (system.force(&x, &pairs), small.force(&own, &pairs_inside));
+        let (whole, part) = (system.force(x, &pairs), small.force(&own, &pairs_inside));
         let free = || (0..own.len()).filter(|v| patch.free[*v]);
         assert!((30..200).contains(&free().count()), "{}", free().count());
         for v in free() {
             assert_relative_eq!(part[v], whole[patch.vertices[v] as usize], epsilon = 1e-12);
         }
-        let moves = patch.moves(&x, &own.iter().map(|p| p + Vec3::y()).collect::<Vec<_>>());
+        let moves = patch.moves(x, &own.iter().map(|p| p + Vec3::y()).collect::<Vec<_>>());
         for (v, old) in patch.vertices.iter().enumerate() {
             let expected = if patch.free[v] {
                 Vec3::y()
@@ -310,6 +276,6 @@ mod tests {
         }
         // What is large all over is no patch.
         large.fill(Vec3::x());
-        assert!(Patch::about(&system, &pairs, &x, &large).is_none());
+        assert!(Patch::about(&system, &pairs, x, &large).is_none());
     }
 }
