@@ -283,8 +283,8 @@ fn without_mean(d: &[Vec3]) -> Vec<Vec3> {
 /// Whether a pair may come closer than `reach` \[m\] while the cloth moves by `d` from `x`.
 fn comes_within(pair: &Pair, x: &[Vec3], d: &[Vec3], reach: f64) -> bool {
     let v = pair.vertices.map(|v| v as usize);
-    let relative = relative_move(pair.kind, v.map(|v| d[v]));
-    pair.closest(v.map(|v| x[v])).r.norm() < reach + relative
+    let distance = pair.closest(v.map(|v| x[v])).r.norm();
+    distance < reach || distance < reach + relative_move(pair.kind, v.map(|v| d[v]))
 }
 
 /// Every vertex as a piece of its own.

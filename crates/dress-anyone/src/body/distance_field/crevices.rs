@@ -46,23 +46,26 @@ impl DistanceField {
         if !(-DEPTH..BALL).contains(&d) || self.open_above(node, d) {
             return (d, Some(node));
         }
+        let slack = SLACK * self.grid.spacing;
+        let reaches = |room: f64| d <= room + slack;
         let mut most = (BALL - FAR as f64 * self.grid.spacing, None);
+        if reaches(most.0) {
+            return (d, Some(node));
+        }
         for z in -FAR..=FAR {
             for y in -FAR..=FAR {
                 for x in -FAR..=FAR {
                     let at = neighbour(node, [x, y, z]);
                     if let Some(room) = self.room_at(node, at).filter(|room| *room > most.0) {
+                        if reaches(room) {
+                            return (d, Some(node));
+                        }
                         most = (room, Some(at));
                     }
                 }
             }
         }
-        let room = most.0 + SLACK * self.grid.spacing;
-        if d <= room {
-            (d, Some(node))
-        } else {
-            (room, most.1)
-        }
+        (most.0 + slack, most.1)
     }
 
     /// Whether the node is as far below the open air above it as it seems.
