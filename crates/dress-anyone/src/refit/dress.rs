@@ -8,11 +8,11 @@ use super::RefitParams;
 use crate::body::Body;
 use crate::body::distance_field::DistanceField;
 use crate::garment::Garment;
-use crate::geometry::Vec3;
+use crate::geometry::{Vec3, intersections};
 use crate::pattern::{Edge, EdgeId};
 use crate::sim::drape::Observer;
 use crate::sim::equilibrium::RestStatus;
-use crate::sim::{Assembly, Drape, Hold, OrFabric, Scene, SimParams, Start, drape};
+use crate::sim::{Assembly, Cloth, Drape, Hold, OrFabric, Scene, SimParams, Start, drape};
 pub use placed::lift;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -151,6 +151,10 @@ pub fn drape_on(
 /// settle is better given up: full skirts and hoods take 400 to 1300.
 const PATIENCE: usize = 4;
 
+/// How often the points that feel the body are set more closely where a fold of skin comes through between
+/// them.
+const HALVINGS: usize = 3;
+
 /// A body, and what a garment on it is made of and held by.
 struct Dressing<'a> {
     body: &'a Body,
@@ -172,13 +176,43 @@ impl Dressing<'_> {
     ) -> Drape {
         let mut cloth = self.params.cloth(garment);
         cloth.holds = holds(garment, placed, self.hold);
-        let scene = Scene {
-            cloth: &cloth,
-            assembly: &Assembly::new(&cloth),
-            surface: self.surface,
-            params: sim,
+        let mut drape = |cloth: &Cloth, x, start| {
+            let scene = Scene {
+                cloth,
+                assembly: &Assembly::new(cloth),
+                surface: self.surface,
+                params: sim,
+            };
+            drape(&scene, &garment.mesh.x_bar, x, start, observe)
         };
-        drape(&scene, &garment.mesh.x_bar, x, start, observe)
+        let mut found = drape(&cloth, x, start);
+        for _ in 0..HALVINGS {
+            let is_final = sim.equilibrium.tolerance < coarse::NEAR_REST;
+            if found.status != RestStatus::AtRest || !is_final {
+                break;
+            }
+            let through = self.triangles_through(&cloth.triangles, &found.x);
+            if through.is_empty() {
+                break;
+            }
+            cloth.feel_more_closely(through.into_iter());
+            let again = drape(&cloth, found.x.clone(), Start::Near);
+            let iterations = found.iterations + again.iterations;
+            if again.status == RestStatus::AtRest {
+                found = again;
+            }
+            found.iterations = iterations;
+        }
+        found
+    }
+
+    /// Triangles of a cloth at `x` through which the body comes.
+    fn triangles_through(&self, triangles: &[[u32; 3]], x: &[Vec3]) -> Vec<usize> {
+        let body = &self.body.mesh;
+        let pairs = intersections::between(x, triangles, &body.positions, &body.triangles);
+        let mut through: Vec<usize> = pairs.iter().map(|[t, _]| *t as usize).collect();
+        through.dedup();
+        through
     }
 }
 
@@ -186,6 +220,35 @@ impl Dressing<'_> {
 mod tests {
     use super::placed::fixtures::tube;
     use super::*;
+    use crate::body::FileFrame;
+    use crate::fixture::add_box;
+    use crate::geometry::TriangleMesh;
+
+    #[test]
+    fn a_sharp_edge_does_not_come_through_between_the_points_that_feel_it() {
+        let mut garment = tube();
+        for panel in &mut garment.pattern.panels {
+            panel.edges[2].label = Some("lower_interface".to_owned());
+        }
+        // A blade that is a little too wide for the tube, which is 64 cm around.
+        let mut mesh = TriangleMesh::default();
+        add_box(&mut mesh, [-0.005, -0.5, -0.004], [0.325, 1.0, 0.004]);
+        let body = Body {
+            name: "blade".to_owned(),
+            mesh,
+            frame: FileFrame::SI,
+            notes: Vec::new(),
+        };
+        let found = drape_on(&garment, &body, &RefitParams::default(), &mut |_, _| true);
+        let through = intersections::between(
+            &found.x,
+            &garment.mesh.cloth_triangles(),
+            &body.mesh.positions,
+            &body.mesh.triangles,
+        );
+        assert_eq!(found.status, RestStatus::AtRest);
+        assert!(through.is_empty());
+    }
 
     #[test]
     fn a_waist_is_held_unless_something_reaches_far_above_it() {

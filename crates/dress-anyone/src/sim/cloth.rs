@@ -43,6 +43,9 @@ pub struct Cloth {
     pub thickness: Vec<f64>,
     /// Where the cloth feels the body.
     pub contacts: Vec<ContactPoint>,
+    /// How often the grid of these points is halved in each triangle, `[triangle]`; none at all where it
+    /// nowhere is.
+    pub(in crate::sim) halved: Vec<u8>,
     /// What it is made of; every one once.
     pub materials: Vec<Material>,
     /// Which of them each triangle is of, `[triangle]`.
@@ -135,7 +138,13 @@ impl Cloth {
         Self {
             hinges: hinges(&mesh.triangles, &triangles),
             folds: Vec::new(),
-            contacts: contact_points(&triangles, |t| mesh.rest_area(t, &mesh.x_bar), friction),
+            contacts: contact_points(
+                &triangles,
+                |t| mesh.rest_area(t, &mesh.x_bar),
+                friction,
+                &[],
+            ),
+            halved: Vec::new(),
             thickness,
             rest_triangles: mesh.triangles.clone(),
             triangles,
@@ -165,13 +174,27 @@ impl Cloth {
 
     /// What part of each contact point's friction is that of one of the `materials`, `[contact point]`.
     pub fn friction_shares(&self, material: usize) -> Vec<f64> {
+        let own = |t: usize| f64::from(usize::from(self.material_of[t]) == material);
+        let points = self.points(own);
+        points.into_iter().map(|point| point.friction).collect()
+    }
+
+    /// Halves the distance between the points that feel the body in some triangles.
+    pub fn feel_more_closely(&mut self, triangles: impl Iterator<Item = usize>) {
+        self.halved.resize(self.triangles.len(), 0);
+        for t in triangles {
+            self.halved[t] += 1;
+        }
+        self.contacts = self.points(|t| self.material(t).friction);
+    }
+
+    /// Where it feels the body, with `friction` of each triangle.
+    fn points(&self, friction: impl Fn(usize) -> f64) -> Vec<ContactPoint> {
         let area = |t: usize| {
             let [a, b, c] = self.reference_corners(t);
             0.5 * cross2(b - a, c - a)
         };
-        let own = |t: usize| f64::from(usize::from(self.material_of[t]) == material);
-        let points = contact_points(&self.triangles, area, own);
-        points.into_iter().map(|point| point.friction).collect()
+        contact_points(&self.triangles, area, friction, &self.halved)
     }
 
     /// Corners of triangle `t` in the reference pattern \[m\].

@@ -22,7 +22,7 @@ const COARSENING: usize = 4;
 const LEAST: usize = 400;
 /// Residual at which a coarse mesh is near enough to rest \[–\]: its energy then falls by some 10⁻⁵
 /// more, and its forces are small beside those that the finer mesh begins with.
-const NEAR_REST: f64 = 1.0;
+pub(super) const NEAR_REST: f64 = 1.0;
 
 /// Fall of a vertex that comes off the body with its garment \[m\], and how large a part of the vertices
 /// then falls so far: a hood alone may, and so may the sides of a skirt.

@@ -58,20 +58,28 @@ fn pieces(count: usize, area: impl Fn(usize) -> f64) -> u32 {
 }
 
 /// The points of all `triangles` of the sewn cloth, once each, with areas that integrate over the pieces
-/// into which the grid cuts every triangle, from the triangles' `area` \[m²\] and `friction`.
+/// into which the grid cuts every triangle, from the triangles' `area` \[m²\] and `friction`. The grid of a
+/// triangle is halved as often as `halved` tells, that of those after its end never; each of its points then
+/// still has the area of one in the whole grid, for taut cloth hangs on few points of a sharp fold, and must
+/// not press through them.
 pub(super) fn contact_points(
     triangles: &[[u32; 3]],
     area: impl Fn(usize) -> f64,
     friction: impl Fn(usize) -> f64,
+    halved: &[u8],
 ) -> Vec<ContactPoint> {
-    let pieces = pieces(triangles.len(), &area);
-    // Of every point the corners with their shares, out of all pieces; area, and friction times area.
+    let coarse = pieces(triangles.len(), &area);
+    let most = halved.iter().copied().max().unwrap_or(0);
+    let finest = coarse << most;
+    // Of every point the corners with their shares, out of the finest pieces; area, and friction times area.
     let mut sums: BTreeMap<[(u32, u32); 3], [f64; 2]> = BTreeMap::new();
     for (t, triangle) in triangles.iter().enumerate() {
-        let third = area(t) / f64::from(3 * pieces * pieces);
+        let halved = halved.get(t).copied().unwrap_or(0);
+        let pieces = coarse << halved;
+        let third = area(t) / f64::from(3 * coarse * coarse);
         for i in 0..=pieces {
             for j in 0..=pieces - i {
-                let shares = [pieces - i - j, i, j];
+                let shares = [pieces - i - j, i, j].map(|share| share << (most - halved));
                 let around = match shares.iter().filter(|s| **s > 0).count() {
                     1 => 1.0,
                     2 => 3.0,
@@ -85,7 +93,7 @@ pub(super) fn contact_points(
     }
     let point = |(key, [area, sum]): ([(u32, u32); 3], [f64; 2])| ContactPoint {
         corners: key.map(|(v, _)| v),
-        weights: key.map(|(_, share)| f64::from(share) / f64::from(pieces)),
+        weights: key.map(|(_, share)| f64::from(share) / f64::from(finest)),
         area,
         friction: sum / area,
     };
@@ -114,7 +122,12 @@ mod tests {
     use approx::assert_relative_eq;
 
     fn points(mesh: &PatternMesh) -> Vec<ContactPoint> {
-        contact_points(&mesh.triangles, |t| mesh.rest_area(t, &mesh.x_bar), |_| 0.0)
+        halved_points(mesh, &[])
+    }
+
+    fn halved_points(mesh: &PatternMesh, halved: &[u8]) -> Vec<ContactPoint> {
+        let area = |t| mesh.rest_area(t, &mesh.x_bar);
+        contact_points(&mesh.triangles, area, |_| 0.0, halved)
     }
 
     #[test]
@@ -136,6 +149,19 @@ mod tests {
         assert_relative_eq!(total(&|_| 1.0), width * height, max_relative = 1e-12);
         let first_moment = 0.5 * width * width * height;
         assert_relative_eq!(total(&|p| p.x), first_moment, max_relative = 1e-12);
+    }
+
+    #[test]
+    fn a_halved_grid_has_the_points_of_the_whole_and_more_that_count_as_much() {
+        let mesh = fixtures::sheet(3, 2, 0.025);
+        let (whole, halved) = (points(&mesh), halved_points(&mesh, &[0, 0, 1]));
+        // Three pieces a side become six: 28 points instead of 10.
+        assert_eq!(halved.len(), whole.len() + 18);
+        let among_halved = |p: &ContactPoint| {
+            let mut same = halved.iter();
+            same.any(|q| (q.corners, q.weights, q.area) == (p.corners, p.weights, p.area))
+        };
+        assert!(whole.iter().all(among_halved));
     }
 
     #[test]

@@ -134,6 +134,7 @@ impl Patch {
                 .iter()
                 .map(|p| whole.contacts[*p].renumbered(&number))
                 .collect(),
+            halved: Vec::new(),
             materials: whole.materials.clone(),
             material_of: of(&triangles, &whole.material_of),
             holds: (whole.holds.iter().filter(|h| free[h.vertex as usize]))
