@@ -191,7 +191,7 @@ fn does_not_rest(body: &str, status: RestStatus, residual: f64, broken: Option<&
              (`sim.contact.friction`, say 0.4, or \"fabric\")"
         ),
         RestStatus::NotFinite => format!(
-            "the drape on the body `{body}` broke down (positions are no longer numbers){}. Check \
+            "the drape on the body `{body}` broke down (positions or gradients are no longer numbers){}. Check \
              the unit of the garment, its fabric, and its placement around the body",
             broken.map(|told| format!(" {told}")).unwrap_or_default()
         ),

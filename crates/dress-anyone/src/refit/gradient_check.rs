@@ -96,11 +96,11 @@ pub fn check_gradient(
     let scene = prepared.scene();
     let search = prepared.search(&scene);
     let mut run = Run::new(&mut clock, observe);
-    let failed = |failed: Failed| failed.on(&prepared.target.name);
+    let failed = |failed: Failed| prepared.told(failed);
     let zeta = prepared.initial();
     let here = search.candidate(zeta.clone(), prepared.x_star.clone(), &mut run);
     let here = here.map_err(failed)?;
-    let (gradient, _) = search.gradient(&here);
+    let (gradient, _) = search.gradient(&here).map_err(failed)?;
     let start = start(&prepared, here.end.x());
     let mut directions = Vec::new();
     for number in 0..count {
@@ -145,14 +145,14 @@ pub fn loss_along(
     let scene = prepared.scene();
     let search = prepared.search(&scene);
     let mut run = Run::new(&mut clock, observe);
-    let failed = |failed: Failed| failed.on(&prepared.target.name);
+    let failed = |failed: Failed| prepared.told(failed);
     let straight = Straight::new(&prepared, 0);
     let step = reach / count as f64;
     let centre = search.candidate(straight.at(0.0), prepared.x_star.clone(), &mut run);
     let centre = centre.map_err(failed)?;
     let told = |there: &Candidate<'_, DistanceField>| {
-        let (gradient, _) = search.gradient(there);
-        (there.total, straight.slope(&gradient))
+        let (gradient, _) = search.gradient(there)?;
+        Ok((there.total, straight.slope(&gradient)))
     };
     let mut side = |sign: f64| {
         let mut x = start(&prepared, centre.end.x());
@@ -162,7 +162,7 @@ pub fn loss_along(
             points.push(match search.candidate(zeta, x.clone(), &mut run) {
                 Ok(there) => {
                     x = start(&prepared, there.end.x());
-                    Some(told(&there))
+                    told(&there).ok()
                 }
                 Err(f) if f.status == RestStatus::Stopped => return Err(failed(f)),
                 Err(_) => None,
@@ -172,7 +172,7 @@ pub fn loss_along(
     };
     let mut points = side(-1.0)?;
     points.reverse();
-    points.push(Some(told(&centre)));
+    points.push(Some(told(&centre).map_err(failed)?));
     points.extend(side(1.0)?);
     let moves = (0..points.len()).map(|k| step * (k as f64 - count as f64));
     Ok(Line {

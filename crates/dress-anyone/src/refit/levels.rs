@@ -113,7 +113,7 @@ pub(super) fn searched(
             level: number,
         };
         let found = level.search(on, guesses, checkpoint.take(), keep, &mut run)?;
-        let found = found.map_err(|failed| failed.on(&prepared.target.name));
+        let found = found.map_err(|failed| prepared.told(failed));
         if found.is_ok() || number + 1 == levels.len() {
             last = found.map(|found| (level.mesh, found));
         }
@@ -162,7 +162,8 @@ fn first_drape(prepared: &Prepared<'_>, run: &mut Run<'_, '_>) -> Result<Vec<Vec
         ..scene
     };
     let first = from_target(prepared, prepared.initial());
-    prepared.search(&scene).first(first, run)
+    let first = prepared.search(&scene).first(first, run);
+    first.map_err(|failed| prepared.told(failed))
 }
 
 /// A pattern, and its cloth let down from the target shape by guides that give way one after the other: so it

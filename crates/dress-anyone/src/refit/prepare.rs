@@ -2,6 +2,7 @@
 //! initial scale (§4.6), the body to drape on and the loss (§4.4).
 
 use super::dress::holds;
+use super::search::point::Failed;
 use super::search::{self, Search};
 use super::{Clock, Observer, RefitError, RefitParams, drape_to_rest};
 use crate::body::Body;
@@ -13,6 +14,7 @@ use crate::geometry::{Vec2, Vec3};
 use crate::loss::Losses;
 use crate::pattern::resample::resample;
 use crate::pattern::symmetry::Symmetry;
+use crate::sim::equilibrium::RestStatus;
 use crate::sim::{Assembly, Cloth, Scene};
 use crate::transfer::{Layout, target_shape};
 use std::sync::Arc;
@@ -167,10 +169,23 @@ impl<'a> Prepared<'a> {
             losses: &self.losses,
             scene,
             params: &self.params.descent,
-            body: &self.target.name,
             motions: &self.motions,
             guide: 0.0,
             keep: None,
+        }
+    }
+
+    /// Why there is no drape on the target body, in words.
+    pub(super) fn told(&self, failed: Failed) -> RefitError {
+        if failed.status == RestStatus::Stopped {
+            return RefitError::Stopped;
+        }
+        let Garment { pattern, mesh, .. } = self.garment;
+        RefitError::NotAtRest {
+            body: self.target.name.clone(),
+            status: failed.status,
+            residual: failed.residual,
+            broken: failed.broken.map(|broken| broken.told(pattern, mesh)),
         }
     }
 

@@ -101,22 +101,23 @@ pub fn recover(
     let carried = Prepared::new(garment, bodies, None, params, &mut clock, observe)?;
     let known = changed(&carried, change);
     clock.stage("drape of the known pattern", observe);
-    let failed = |failed: Failed| failed.on(&target.name);
     let x_star = {
         let scene = carried.scene();
         let start = carried.x_star.clone();
         let search = carried.search(&scene);
         let draped = search.candidate(known.clone(), start, &mut Run::new(&mut clock, observe));
-        draped.map_err(failed)?.end.x().to_vec()
+        let draped = draped.map_err(|failed| carried.told(failed))?;
+        draped.end.x().to_vec()
     };
     let prepared = carried.aimed_at(x_star.clone())?;
     let scene = prepared.scene();
     let search = prepared.search(&scene);
+    let failed = |failed: Failed| prepared.told(failed);
     let there = search
         .candidate(known.clone(), x_star, &mut Run::new(&mut clock, observe))
         .map_err(failed)?;
     let total = there.total;
-    let model = search.model(&search.accept(there));
+    let model = search.model(&*search.accept(there).map_err(failed)?);
     let found = levels::searched(&prepared, None, &mut clock, observe)?;
 
     let mesh = &garment.mesh;

@@ -10,7 +10,6 @@ pub(super) mod newton;
 pub(super) mod point;
 mod run;
 
-use super::RefitError;
 use super::checkpoint::{Checkpoint, Keep};
 use crate::cage::{Cages, Prior};
 use crate::descent::slope::Slope;
@@ -36,8 +35,6 @@ const SHORTEST_TRIAL: f64 = 1e-5;
 
 /// Everything the search needs and does not change.
 pub(super) struct Search<'a, S> {
-    /// Name of the target body, for messages.
-    pub(super) body: &'a str,
     pub(super) mesh: &'a PatternMesh,
     pub(super) cages: &'a Cages,
     /// ∂x̄ along each unknown, `[unknown][pattern vertex]`.
@@ -135,8 +132,7 @@ impl<'s, S: Surface> Search<'s, S> {
         for guess in guesses {
             let beaten = best.as_ref().map_or(f64::INFINITY, |best| best.total);
             match self.trial(&guess.zeta, guess.x, beaten, usize::MAX, run) {
-                Ok(Some(tried)) => {
-                    let next = self.accept(tried);
+                Ok(Some(next)) => {
                     let far = best.map_or(0.0, |best| farthest(&next.x_bar, &best.x_bar));
                     run.note(self, &next, far);
                     best = Some(next);
@@ -173,13 +169,8 @@ impl<'s, S: Surface> Search<'s, S> {
     }
 
     /// A guess, draped and noted: where it lies \[m\].
-    pub(super) fn first(
-        &self,
-        guess: Guess,
-        run: &mut Run<'_, '_>,
-    ) -> Result<Vec<Vec3>, RefitError> {
-        let tried = self.candidate(guess.zeta, guess.x, run);
-        let first = self.accept(tried.map_err(|failed| failed.on(self.body))?);
+    pub(super) fn first(&self, guess: Guess, run: &mut Run<'_, '_>) -> Result<Vec<Vec3>, Failed> {
+        let first = self.accept(self.candidate(guess.zeta, guess.x, run)?)?;
         run.note(self, &first, 0.0);
         Ok(first.x)
     }

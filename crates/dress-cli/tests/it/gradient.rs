@@ -76,6 +76,32 @@ fn an_optimizer_that_needs_more_than_a_gradient_is_refused_without_it() {
     );
 }
 
+#[test]
+fn a_trajectory_that_breaks_down_tells_where_on_the_way_there_and_back() {
+    let place = Workplace::new();
+    let line = ["drape", "--garment", "tee.json", "--body", "body.obj"];
+    let coarse = ["--resolution", "35", "--quiet", "--out", "drape"];
+    let ran = place.dress(&[&line[..], &coarse].concat());
+    assert_eq!(ran.code, 0, "{}", ran.stderr);
+    // One step so long that it falls beyond all numbers; a slope so steep that its square is none.
+    let broken = [
+        ("[sim.step]\ndt = 1e200\n", "in step 0 "),
+        (
+            "[loss]\ninterior = 1e200\n",
+            "walking back through step 179;",
+        ),
+    ];
+    for (params, step) in broken {
+        place.file("broken.toml", params);
+        let more = ["--gradient", "trajectory", "--params", "broken.toml"];
+        let ran = place.refit("drape/garment.obj", "body.obj", &more);
+        assert_ne!(ran.code, 0, "{}", ran.stderr);
+        for told in [step, "triangle ", "in panel `"] {
+            assert!(ran.stderr.contains(told), "{told} in {}", ran.stderr);
+        }
+    }
+}
+
 /// Number of accepted steps and level of the search in a checkpoint, once there is one.
 fn noted(path: &Path) -> Option<(usize, u64)> {
     let state: Value =

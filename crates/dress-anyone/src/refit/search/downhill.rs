@@ -63,7 +63,6 @@ impl<'s, S: Surface> Search<'s, S> {
                     }
                     Ok(Some(next)) => {
                         slope.length *= 2.0;
-                        let next = self.accept(next);
                         slope.learn(step, &next.gradient - &best.gradient);
                         return Stepped::Better(next);
                     }

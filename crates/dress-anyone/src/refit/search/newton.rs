@@ -46,7 +46,7 @@ impl<'s, S: Surface> Search<'s, S> {
                     }
                     Ok(Some(next)) => {
                         damping.relax();
-                        return Stepped::Better(self.accept(next));
+                        return Stepped::Better(next);
                     }
                     _ => refusals += 1,
                 }

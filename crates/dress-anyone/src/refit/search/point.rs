@@ -5,8 +5,8 @@ use super::{Run, Search};
 use crate::descent::Gradient;
 use crate::geometry::{Vec2, Vec3};
 use crate::loss::Loss;
-use crate::refit::RefitError;
 use crate::refit::checkpoint::Checkpoint;
+use crate::sim::broken::Broken;
 use crate::sim::differentiable::{Differentiable, differentiable_at};
 use crate::sim::drape::DrapeProgress;
 use crate::sim::energy::contact::Surface;
@@ -36,6 +36,8 @@ pub(in crate::refit) struct Failed {
     pub(in crate::refit) status: RestStatus,
     /// ‖f‖/(‖m‖|g|).
     pub(in crate::refit) residual: f64,
+    /// Where the drape, or the walk back through it, broke down, if it did.
+    pub(in crate::refit) broken: Option<Broken>,
 }
 
 /// A pattern tried, and its drape.
@@ -69,20 +71,8 @@ impl Failed {
     pub(super) const NEVER_TRIED: Self = Self {
         status: RestStatus::Stopped,
         residual: f64::NAN,
+        broken: None,
     };
-
-    /// The failure, told of the body called so.
-    pub(in crate::refit) fn on(self, body: &str) -> RefitError {
-        if self.status == RestStatus::Stopped {
-            return RefitError::Stopped;
-        }
-        RefitError::NotAtRest {
-            body: body.to_owned(),
-            status: self.status,
-            residual: self.residual,
-            broken: None,
-        }
-    }
 }
 
 impl<S: Surface> End<'_, S> {
@@ -110,16 +100,16 @@ impl<S: Surface> End<'_, S> {
         }
     }
 
-    /// (∂x/∂x̄)ᵀ x̂, and how large the adjoint grew.
-    fn pull_back(&self, x_hat: &[Vec3]) -> (Vec<Vec2>, f64) {
+    /// (∂x/∂x̄)ᵀ x̂, and how large the adjoint grew; or where it broke down.
+    fn pull_back(&self, x_hat: &[Vec3]) -> Result<(Vec<Vec2>, f64), Broken> {
         match self {
             Self::Rest(state) => {
                 let (hat, lambda) = state.pull_back(x_hat);
-                (hat, lambda.iter().map(Vec3::norm).fold(0.0, f64::max))
+                Ok((hat, lambda.iter().map(Vec3::norm).fold(0.0, f64::max)))
             }
             Self::Path(trajectory) => {
                 let hat = trajectory.pull_back(x_hat);
-                (hat.x_bar, hat.growth)
+                hat.broken.map_or(Ok((hat.x_bar, hat.growth)), Err)
             }
         }
     }
@@ -137,7 +127,7 @@ impl<'s, S: Surface> Search<'s, S> {
         self.draped(zeta, start, all, run)
     }
 
-    /// The same if its loss is below `wanted`: what is not when the cloth is almost at rest is not draped to
+    /// The same with its gradient, if its loss is below `wanted`: what is not when the cloth is almost at rest is not draped to
     /// its end, nor is what takes more than `patience` factorisations.
     pub(super) fn trial(
         &self,
@@ -146,7 +136,7 @@ impl<'s, S: Surface> Search<'s, S> {
         wanted: f64,
         patience: usize,
         run: &mut Run<'_, '_>,
-    ) -> Result<Option<Candidate<'s, S>>, Failed> {
+    ) -> Result<Option<Box<Point<'s>>>, Failed> {
         let x_bar = self.cages.deform(zeta);
         let (mut promising, mut refused) = (false, false);
         let mut judge = |progress, x: &dyn Fn() -> Vec<Vec3>| {
@@ -170,8 +160,8 @@ impl<'s, S: Surface> Search<'s, S> {
         if refused {
             return Ok(None);
         }
-        let tried = tried?;
-        Ok((tried.total < wanted).then_some(tried))
+        let better = Some(tried?).filter(|tried| tried.total < wanted);
+        better.map(|better| self.accept(better)).transpose()
     }
 
     fn draped(
@@ -207,9 +197,12 @@ impl<'s, S: Surface> Search<'s, S> {
         let found = drape(self.scene, x_bar, start, Start::Near, &mut |p, x| {
             run.drapes(p) && judge(p, x)
         });
-        let (status, residual) = (found.status, found.residual);
-        let failed = Failed { status, residual };
-        if status != RestStatus::AtRest {
+        let failed = Failed {
+            status: found.status,
+            residual: found.residual,
+            broken: found.broken,
+        };
+        if failed.status != RestStatus::AtRest {
             run.count_factorisations(found.iterations);
             return Err(failed);
         }
@@ -226,19 +219,30 @@ impl<'s, S: Surface> Search<'s, S> {
         run: &mut Run<'_, '_>,
     ) -> Result<End<'s, S>, Failed> {
         let steps = self.scene.params.step.steps();
-        let failed = |status, residual| Failed { status, residual };
         let found = Trajectory::run(self.scene, x_bar, start, steps, &mut |p| run.drapes(p));
-        let found = found.ok_or(failed(RestStatus::Stopped, f64::NAN))?;
-        let residual = found.residual();
-        if found.broken().is_some() || !residual.is_finite() {
-            return Err(failed(RestStatus::NotFinite, residual));
+        let found = found.ok_or(Failed::NEVER_TRIED)?;
+        let (residual, broken) = (found.residual(), found.broken());
+        if broken.is_some() || !residual.is_finite() {
+            return Err(Failed {
+                status: RestStatus::NotFinite,
+                residual,
+                broken,
+            });
         }
         Ok(End::Path(Box::new(found)))
     }
 
     /// The gradient of a candidate's loss by the unknowns \[1/m\], and how large the adjoint grew.
-    pub(in crate::refit) fn gradient(&self, of: &Candidate<'_, S>) -> (DVector<f64>, f64) {
-        let (mut hat, adjoint_norm) = of.end.pull_back(&of.loss.x_hat);
+    pub(in crate::refit) fn gradient(
+        &self,
+        of: &Candidate<'_, S>,
+    ) -> Result<(DVector<f64>, f64), Failed> {
+        let pulled = of.end.pull_back(&of.loss.x_hat);
+        let (mut hat, adjoint_norm) = pulled.map_err(|broken| Failed {
+            status: RestStatus::NotFinite,
+            residual: of.end.residual(),
+            broken: Some(broken),
+        })?;
         for (hat, direct) in hat.iter_mut().zip(&of.loss.x_bar_hat) {
             *hat += direct;
         }
@@ -248,12 +252,15 @@ impl<'s, S: Surface> Search<'s, S> {
                 gradient[j] += 2.0 * prior.value * slope;
             }
         }
-        (gradient, adjoint_norm)
+        Ok((gradient, adjoint_norm))
     }
 
-    /// The candidate with its gradient. Its stiffness is factored anew from its positions alone, so
+    /// The candidate with its gradient, if that does not break down. Its stiffness is factored anew from its positions alone, so
     /// that a resumed search goes on with the same bits.
-    pub(in crate::refit) fn accept(&self, mut candidate: Candidate<'s, S>) -> Box<Point<'s>> {
+    pub(in crate::refit) fn accept(
+        &self,
+        mut candidate: Candidate<'s, S>,
+    ) -> Result<Box<Point<'s>>, Failed> {
         if let End::Rest(state) = &mut candidate.end {
             let (x, x_bar) = (state.drape.x.clone(), state.drape.x_bar.clone());
             let grips = state.grips().to_vec();
@@ -261,14 +268,14 @@ impl<'s, S: Surface> Search<'s, S> {
                 **state = anew;
             }
         }
-        let (gradient, adjoint_norm) = self.gradient(&candidate);
+        let (gradient, adjoint_norm) = self.gradient(&candidate)?;
         let end = candidate.end;
         let (x, x_bar, residual) = (end.x().to_vec(), end.x_bar().to_vec(), end.residual());
         let state = match end {
             End::Rest(state) => Some(state),
             End::Path(_) => None,
         };
-        Box::new(Point {
+        Ok(Box::new(Point {
             zeta: candidate.zeta,
             x,
             x_bar,
@@ -279,7 +286,7 @@ impl<'s, S: Surface> Search<'s, S> {
             residual,
             shift: state.as_ref().map_or(0.0, |state| state.shift),
             state,
-        })
+        }))
     }
 
     /// The point that a checkpoint was made at; none if its stiffness cannot be factored.
