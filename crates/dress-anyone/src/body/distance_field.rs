@@ -140,26 +140,30 @@ impl DistanceField {
     fn stencil(&self, p: Vec3) -> Option<(Coefficients, [f64; 3])> {
         let (first, t) = self.place_of(p)?;
         // Along each axis the four nodes lie in one brick or in two neighbours.
+        let local = first.map(|i| i % SIDE);
+        let corner_at = |[x, y, z]: [usize; 3]| x / SIDE + 2 * (y / SIDE) + 4 * (z / SIDE);
+        let across = corner_at(local.map(|i| i + 3));
         let mut starts = [0; 8];
-        for (corner, start) in starts.iter_mut().enumerate() {
-            let [x, y, z] = first;
-            let node = [
-                x + 3 * (corner & 1),
-                y + 3 * (corner >> 1 & 1),
-                z + 3 * (corner >> 2),
-            ];
-            *start = self.grid.ordinal(node)? * BRICK;
+        for corner in 0..8 {
+            starts[corner] = if corner & across == corner {
+                let node = [0, 1, 2].map(|axis| first[axis] + 3 * (corner >> axis & 1));
+                self.grid.ordinal(node)? * BRICK
+            } else {
+                starts[corner & across]
+            };
         }
         let mut coefficients = [[[0.0; 4]; 4]; 4];
-        let second = |axis: usize, i: usize| (first[axis] + i) / SIDE - first[axis] / SIDE;
-        for k in 0..4 {
-            for j in 0..4 {
-                let row = second(1, j) << 1 | second(2, k) << 2;
-                let at = (first[2] + k) % SIDE * SIDE + (first[1] + j) % SIDE;
-                for i in 0..4 {
-                    let start = starts[row | second(0, i)];
-                    coefficients[k][j][i] = self.values[start + at * SIDE + (first[0] + i) % SIDE];
-                }
+        for (k, plane) in coefficients.iter_mut().enumerate() {
+            let z = local[2] + k;
+            for (j, row) in plane.iter_mut().enumerate() {
+                let y = local[1] + j;
+                let corner = corner_at([local[0], y, z]);
+                let at = (z % SIDE * SIDE + y % SIDE) * SIDE;
+                let start = starts[corner] + at + local[0];
+                let (here, beyond) = row.split_at_mut(SIDE.min(local[0] + 4) - local[0]);
+                here.copy_from_slice(&self.values[start..start + here.len()]);
+                let start = starts[corner | 1] + at;
+                beyond.copy_from_slice(&self.values[start..start + beyond.len()]);
             }
         }
         Some((coefficients, t))
