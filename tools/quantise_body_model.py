@@ -6,6 +6,8 @@
 mhbody_lite.npz is made from MakeHuman's CC0 data by tools/body_model/make_bodies.py (see there). This
 script keeps what the fit uses: the first 40 of 60 shape components, and all directions as 16-bit
 integers, with one scale per component (`shapedirs_scale`, `propdirs_scale`: value = integer * scale).
+Triangles of the right side become the mirror images of the left side's: a few are cut along the other
+diagonal of the same four corners, and a body as symmetric as its vertices has to have both alike.
 Needs numpy only. Members carry no time, so the same input gives the same bytes.
 """
 import io
@@ -24,9 +26,21 @@ def quantised(directions):
     return np.rint(directions / scale).astype(np.int16), scale
 
 
+def symmetric(faces, mirror, template):
+    """The faces, where those of the right side (x < 0) that are no mirror images are put right."""
+    images = mirror[faces][:, ::-1]
+    known = {frozenset(face) for face in faces.tolist()}
+    odd = np.array([frozenset(face) not in known for face in images.tolist()])
+    left = template[faces].mean(axis=1)[:, 0] > 0
+    faces = faces.copy()
+    faces[odd & ~left] = images[odd & left]
+    return faces
+
+
 def main(source, target):
     model = np.load(source)
     arrays = {name: model[name] for name in KEPT}
+    arrays["f"] = symmetric(model["f"], model["mirror"], model["v_template"])
     arrays["shapedirs"], arrays["shapedirs_scale"] = quantised(model["shapedirs"][:, :, :COMPONENTS])
     arrays["propdirs"], arrays["propdirs_scale"] = quantised(model["propdirs"])
     arrays["prop_names"] = model["prop_names"]
