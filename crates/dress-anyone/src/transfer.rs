@@ -2,13 +2,18 @@
 //! O'Malley 2020). Geometry only: not physical, no pattern.
 //!
 //! 1. Carry every cloth vertex from the space around the source body to that around the target
-//!    (`bind`), both with parts that overlap drawn apart ([`parted`]).
+//!    (`bind`), both with parts that overlap drawn apart ([`crate::body::parted`]).
 //! 2. Repeat: give what touches the body its distance to it (`settle`, `ease`), and relax (`relax`), which
 //!    keeps the garment's layout, lines and layers (`layout`, `layers`) through affine-invariant stencils.
 //!    Along the body cloth is held softly, across it firmly where it touches (`hold`); off the body it
 //!    hangs, and bridges (`hang`).
 //! 3. Where folds went through each other, hold them less and repeat (`folds`).
-//! 4. Take it out of the body (`clear`), and where triangles met it, relax once more.
+//! 4. Where triangles meet the body (`clear`), relax once more.
+//! 5. Carry the result back to the source body in the same way, and take back half of what that misses the
+//!    drape by: relaxing loses some of each change, and half of the loss is either way's. To first order
+//!    the way there and the way back are each other's inverse then (what Christensen & Johnson 2001 ask
+//!    of registrations of images).
+//! 6. Take it out of the body, and draw apart layers that met on the way (`folds`).
 //!
 //! Departures from the original: binding is to a smooth patch of body, not to a closest point, and
 //! rebinding restores distances along the normal only; the place along the body stays tied to the
@@ -27,21 +32,17 @@ mod paint;
 mod relax;
 mod room;
 mod settle;
+mod way;
 
-use crate::body::{Body, parted};
-use crate::geometry::{ClosestPoint, Mat3, Vec3, bounds};
-use bind::{BodyMap, Carried};
-use clear::{Clearing, belongs};
-use draped::Draped;
+use crate::body::Body;
+use crate::geometry::Vec3;
+use crate::geometry::mesh::rings;
 pub use ease::{Ease, EaseAt};
-use folds::Folds;
-use hold::Rims;
 pub use layout::{Layout, Zone};
 pub use paint::Paint;
 use rayon::prelude::*;
-use relax::{Hold, Kept, Relaxation, Slope, Springs, Stencil};
 use serde::{Deserialize, Serialize};
-use settle::{Ground, Settling};
+use way::{Skin, Way};
 
 /// How the drape is carried over.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -124,14 +125,6 @@ pub enum TransferError {
     NotFinite(String),
 }
 
-/// How far a rim that grips may be pulled in, as share of the body's height: 3 cm on an adult.
-const GRIP: f64 = 0.02;
-/// First step of a triangle that meets the body, as share of its height: half a millimetre.
-const STEP: f64 = 3e-4;
-/// Times that folds which go through each other are let go.
-const LOOSENINGS: usize = 3;
-/// Times that a garment which met the body is relaxed again, to even out what was pushed.
-const SMOOTHINGS: usize = 2;
 /// Carries a drape from `source` to `target`, two bodies of one topology.
 ///
 /// `drape` are the positions of the welded cloth \[m\] that `layout` describes. Equal bodies give back
@@ -145,144 +138,28 @@ pub fn target_shape(
     params: &TransferParams,
 ) -> Result<Target, TransferError> {
     check(drape, &layout.triangles, source, target)?;
-    let skins = [source, target].map(|body| parted(&body.mesh));
-    let surfaces = [0, 1].map(|k| ClosestPoint::new(&skins[k]));
-    let [on_source, on_target] = &surfaces;
-    let mut draped = Draped::new(drape, &layout.triangles, (source, on_source));
-    let map = BodyMap::new(&skins[0], &skins[1]);
-    let bound: Vec<Carried> = (0..drape.len())
-        .into_par_iter()
-        .map(|v| {
-            map.carry(
-                drape[v],
-                draped.facing[v],
-                draped.distance[v],
-                layout.ease[v],
-            )
-        })
-        .collect();
-    let carried: Vec<Vec3> = bound.iter().map(|carried| carried.point).collect();
-    draped.meet(&carried, (skins[1].area() / skins[0].area()).sqrt());
-    let turns: Vec<Mat3> = drape.par_iter().map(|&x| map.turn(x)).collect();
-    let slopes = hang::slopes(&draped, &bound, &turns);
-    let grounds = grounds(
-        &draped,
-        (&bound, &turns),
-        &slopes,
-        layout,
-        &surfaces,
+    let skins = [source, target].map(Skin::of);
+    let rings = rings(drape.len(), &layout.triangles);
+    let cloth = (layout, &rings[..]);
+    let mut there = Way::new((drape, Vec3::y()), cloth, [&skins[0], &skins[1]], params);
+    let mut settled = there.settled();
+    let mut back = Way::new(
+        (&settled.x, there.up),
+        cloth,
+        [&skins[1], &skins[0]],
         params,
     );
-    let springs = Springs {
-        kept: layout.kept.iter().map(|&e| Kept::of(e, drape)).collect(),
-        ties: layers::ties(
-            drape,
-            &layout.triangles,
-            &draped.rings,
-            &bound,
-            draped.height,
-        ),
-        slopes,
-    };
-    let ring = |(v, ring): (usize, &Vec<u32>)| Stencil {
-        centre: v as u32,
-        around: ring.clone(),
-    };
-    let mut stencils: Vec<Stencil> = draped.rings.iter().enumerate().map(ring).collect();
-    stencils.extend(layout.line_stencils());
-    let usual: Vec<Hold> = grounds.iter().map(Ground::usual).collect();
-    let (low, high) = bounds(drape);
-    let mut settling = Settling {
-        relaxation: Relaxation::new(drape, &stencils, &usual, springs),
-        body: on_target,
-        bound: &bound,
-        grounds,
-        still: params.tolerance * (high - low).norm(),
-        rounds: params.iterations,
-    };
-    let step = STEP * draped.height;
-    // Cloth that was in another part's half already may stay there.
-    let home = |(carried, x): (&Carried, &Vec3)| {
-        let [before, after] = carried.normals;
-        let home = belongs(on_source, *x, before);
-        if home { after } else { Vec3::zeros() }
-    };
-    let homes = bound.iter().zip(drape).map(home).collect();
-    let clearing = Clearing::new(
-        on_target,
-        &skins[1],
-        &layout.triangles,
-        &draped.rings,
-        homes,
-        step,
-    );
-    let mut least: Vec<f64> = (settling.grounds.iter())
-        .map(|ground| ground.wanted.clamp(0.0, params.thickness))
-        .collect();
-    let mut x = carried;
-    let (mut iterations, mut converged) = settling.settle(&mut x, &least);
-    let folds = Folds::new(drape, &layout.triangles, &draped.rings);
-    for _ in 0..LOOSENINGS {
-        let around = folds.around_meetings(&x);
-        if around.is_empty() {
-            break;
-        }
-        for v in around {
-            settling.grounds[v as usize].firmness.let_go();
-        }
-        let (more, settled) = settling.settle(&mut x, &least);
-        iterations += more;
-        converged = settled;
-    }
-    for _ in 0..SMOOTHINGS {
-        let mut cleared = x.clone();
-        if !clearing.clear(&mut cleared, &mut least) {
-            break;
-        }
-        settling.settle(&mut x, &least);
-    }
-    clearing.clear(&mut x, &mut least);
-    let clearance = (x.par_iter())
-        .map(|&x| on_target.signed_distance(x))
-        .collect();
+    let missed = back.settled();
+    let missed: Vec<Vec3> = (missed.x.iter().zip(drape)).map(|(x, y)| x - y).collect();
+    there.take_back(&mut settled.x, missed);
+    there.clear(&mut settled.x);
+    let clearance = |&x: &Vec3| skins[1].surface.signed_distance(x);
     Ok(Target {
-        x_star: x,
-        iterations,
-        converged,
-        clearance,
+        clearance: settled.x.par_iter().map(clearance).collect(),
+        x_star: settled.x,
+        iterations: settled.rounds,
+        converged: settled.converged,
     })
-}
-
-/// How each vertex stands to the target body.
-fn grounds(
-    draped: &Draped<'_>,
-    (bound, turns): (&[Carried], &[Mat3]),
-    slopes: &[Slope],
-    layout: &Layout,
-    surfaces: &[ClosestPoint; 2],
-    params: &TransferParams,
-) -> Vec<Ground> {
-    let touching = hold::touching(draped);
-    let across = |v: usize| {
-        let free = turns[v] * draped.facing[v];
-        let across = free.lerp(&bound[v].normals[1], touching[v]);
-        across.try_normalize(1e-9).unwrap_or_else(Vec3::zeros)
-    };
-    let across: Vec<Vec3> = (0..bound.len()).map(across).collect();
-    let rims = Rims::new(draped);
-    let lines = (&rims, &layout.lines[..]);
-    let firmness = hold::firmness(draped, lines, (bound, &across), params);
-    let pressures = hang::pressures(draped, slopes);
-    let wanted = room::wanted(draped.x, &draped.distance, bound, surfaces);
-    let ground = |v: usize| Ground {
-        across: across[v],
-        touching: touching[v],
-        wanted: wanted[v],
-        pressure: pressures[v] * touching[v]
-            + rims.grips[v] * firmness[v].touching * GRIP * draped.height,
-        firmness: firmness[v],
-    };
-    (0..bound.len()).map(ground).collect()
 }
 
 fn check(

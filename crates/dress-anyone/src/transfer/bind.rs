@@ -87,16 +87,16 @@ const THIN: f64 = 0.02;
 const AVERTED: f64 = 1e-6;
 
 impl BodyMap {
-    pub(super) fn new(source: &TriangleMesh, target: &TriangleMesh) -> Self {
+    /// Of a source of this `height` \[m\].
+    pub(super) fn new(source: &TriangleMesh, target: &TriangleMesh, height: f64) -> Self {
         let corners = |mesh: &TriangleMesh| -> Vec<[Vec3; 3]> {
             (0..mesh.triangles.len()).map(|t| mesh.corners(t)).collect()
         };
         let (before, after) = (corners(source), corners(target));
         let area = |[a, b, c]: [Vec3; 3]| 0.5 * (b - a).cross(&(c - a)).norm();
         let mean_area = before.iter().map(|&t| area(t)).sum::<f64>() / before.len() as f64;
-        let (low, high) = source.bounds();
         // A patch of a coarse mesh needs some triangles too.
-        let width = (WIDTH * (high - low).max()).max(2.5 * mean_area.sqrt());
+        let width = (WIDTH * height).max(2.5 * mean_area.sqrt());
         // A round of averaging spreads by about the square root of a triangle's area.
         let rounds = (width * width / mean_area).round() as usize;
         let moments = patch_moments(source, &before, &after, rounds.clamp(2, 20));
@@ -126,7 +126,7 @@ impl BodyMap {
             pieces,
             width,
             groups,
-            reach: REACH * (high - low).max(),
+            reach: REACH * height,
         }
     }
 
@@ -146,6 +146,15 @@ impl BodyMap {
             }
             reach *= 2.0;
         }
+    }
+
+    /// How the whole body turns.
+    pub(super) fn turn_of_all(&self) -> Mat3 {
+        let mut sum = Moments::NONE;
+        for (_, moments) in &self.groups {
+            sum.add(moments, 1.0);
+        }
+        sum.deformation().turn
     }
 
     /// Carries the point `x` of a cloth that looks along `outward` and is `distance` \[m\] away from
@@ -345,7 +354,7 @@ mod tests {
             let move_ = |p: &Vec3| turn * p * scale + Vec3::new(1.0, 2.0, 3.0);
             let mut target = body.clone();
             target.positions = body.positions.iter().map(move_).collect();
-            let map = BodyMap::new(&body, &target);
+            let map = BodyMap::new(&body, &target, 0.6);
             for i in 0..50 {
                 let x = point(i);
                 let carried = map.carry(x, x.normalize(), x.norm() - 0.3, ease.into());
@@ -359,7 +368,7 @@ mod tests {
     #[test]
     fn ease_in_metres_survives_a_larger_body() {
         let body = sphere(0.3, 4);
-        let map = BodyMap::new(&body, &sphere(0.36, 4));
+        let map = BodyMap::new(&body, &sphere(0.36, 4), 0.6);
         for i in 0..50 {
             let direction = point(i).normalize();
             let ease = Ease::Absolute.into();
@@ -373,7 +382,7 @@ mod tests {
 
     #[test]
     fn nothing_tears_between_two_legs() {
-        let map = BodyMap::new(&pair(0.02), &pair(0.08));
+        let map = BodyMap::new(&pair(0.02), &pair(0.08), 0.42);
         let carried: Vec<Vec3> = (0..=400)
             .map(|i| Vec3::new(0.2 * f64::from(i) / 400.0 - 0.1, 0.0, 0.13))
             .map(|x| {

@@ -160,7 +160,7 @@ impl<'a> Clearing<'a> {
     }
 
     /// Applies `pushes`; where the mean of those around, times `share`, is larger, that.
-    fn spread(&self, x: &mut [Vec3], pushes: &[Vec3], share: f64) {
+    pub(super) fn spread(&self, x: &mut [Vec3], pushes: &[Vec3], share: f64) {
         for (v, ring) in self.rings.iter().enumerate() {
             let around: Vec3 = ring.iter().map(|&i| pushes[i as usize]).sum();
             let around = around * (share / ring.len().max(1) as f64);

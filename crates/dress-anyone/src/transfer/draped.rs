@@ -1,7 +1,6 @@
 //! A garment on the source body, and what its target shape needs to know of it.
 
-use crate::body::Body;
-use crate::geometry::mesh::{rings, vertex_normals};
+use crate::geometry::mesh::vertex_normals;
 use crate::geometry::{ClosestPoint, Vec3};
 use rayon::prelude::*;
 use std::iter::Sum;
@@ -13,7 +12,7 @@ pub(super) struct Draped<'a> {
     pub(super) x: &'a [Vec3],
     pub(super) triangles: &'a [[u32; 3]],
     /// The neighbours of every vertex along the triangles' edges, ascending.
-    pub(super) rings: Vec<Vec<u32>>,
+    pub(super) rings: &'a [Vec<u32>],
     /// Usual length of the edges at each vertex \[m\]; once it is known where they go, half way to there.
     pub(super) sizes: Vec<f64>,
     /// Signed distances to the body \[m\].
@@ -21,6 +20,8 @@ pub(super) struct Draped<'a> {
     /// Unit directions in which the cloth faces, away from the body on the whole, freed from folds; zero where
     /// it faces none.
     pub(super) facing: Vec<Vec3>,
+    /// The unit direction against which cloth hangs.
+    pub(super) up: Vec3,
     /// The body's \[m\]: lengths that mean the same on all bodies are shares of it.
     pub(super) height: f64,
 }
@@ -34,20 +35,20 @@ const ROUNDS: f64 = 150.0;
 impl<'a> Draped<'a> {
     pub(super) fn new(
         x: &'a [Vec3],
-        triangles: &'a [[u32; 3]],
-        (body, surface): (&Body, &ClosestPoint),
+        (triangles, rings): (&'a [[u32; 3]], &'a [Vec<u32>]),
+        surface: &ClosestPoint,
+        (up, height): (Vec3, f64),
     ) -> Self {
-        let (low, high) = body.mesh.bounds();
-        let rings = rings(x.len(), triangles);
         let mut draped = Self {
             x,
             triangles,
-            sizes: sizes(x, &rings),
+            sizes: sizes(x, rings),
             distance: (x.par_iter())
                 .map(|&x| surface.signed_distance(x))
                 .collect(),
             facing: Vec::new(),
-            height: (high - low).max(),
+            up,
+            height,
             rings,
         };
         let normals = draped.averaged(vertex_normals(x, triangles), FOLDS);
@@ -71,7 +72,7 @@ impl<'a> Draped<'a> {
     /// Takes the sizes of edges half way to those of `points`, where everything is `growth` times as large: what
     /// is a third as long there is held alike on the way there and on the way back.
     pub(super) fn meet(&mut self, points: &[Vec3], growth: f64) {
-        let there = sizes(points, &self.rings);
+        let there = sizes(points, self.rings);
         for (size, there) in self.sizes.iter_mut().zip(there) {
             *size = (*size * there / growth).sqrt();
         }
@@ -113,6 +114,7 @@ mod tests {
     use crate::check::noise;
     use crate::geometry::TriangleMesh;
     use crate::geometry::closest_point::tests::sphere;
+    use crate::geometry::mesh::rings;
 
     #[test]
     fn sizes_half_way_are_the_same_there_and_back() {
@@ -120,24 +122,19 @@ mod tests {
             positions: here,
             triangles,
         } = sphere(0.5, 2);
-        let body = |x: &[Vec3]| Body {
-            name: "ball".to_owned(),
-            mesh: TriangleMesh {
-                positions: x.to_vec(),
-                triangles: triangles.clone(),
-            },
-            frame: crate::body::FileFrame::SI,
-            notes: Vec::new(),
-        };
         // Half as large, and parts of it a third as long again.
         let place = |(i, p): (usize, &Vec3)| {
             0.5 * Vec3::new(p.x, p.y - 0.67 * p.y.max(0.0), p.z + 0.01 * noise(i))
         };
         let there: Vec<Vec3> = here.iter().enumerate().map(place).collect();
         let met = |from: &[Vec3], to: &[Vec3], growth: f64| {
-            let body = body(from);
-            let surface = ClosestPoint::new(&body.mesh);
-            let mut draped = Draped::new(from, &triangles, (&body, &surface));
+            let body = TriangleMesh {
+                positions: from.to_vec(),
+                triangles: triangles.clone(),
+            };
+            let rings = rings(from.len(), &triangles);
+            let (surface, upright) = (ClosestPoint::new(&body), (Vec3::y(), 1.0));
+            let mut draped = Draped::new(from, (&triangles, &rings), &surface, upright);
             let before = draped.sizes.clone();
             draped.meet(to, growth);
             (before, draped.sizes)

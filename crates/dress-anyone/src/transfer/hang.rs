@@ -19,7 +19,7 @@
 use super::bind::Carried;
 use super::draped::Draped;
 use super::relax::{FLEXIBILITY, Slope};
-use crate::geometry::{Mat3, Vec3};
+use crate::geometry::Mat3;
 
 /// Length below which the stencils decide, and above which tension does, as share of the body's height: 9 cm.
 const STIFF: f64 = 0.05;
@@ -53,14 +53,14 @@ pub(super) fn slopes(draped: &Draped<'_>, bound: &[Carried], turns: &[Mat3]) -> 
 
 /// How hard the body may press on each vertex where it touches, in the unit of the relaxation's forces.
 pub(super) fn pressures(draped: &Draped<'_>, slopes: &[Slope]) -> Vec<f64> {
-    let Draped { x, facing, .. } = draped;
+    let Draped { x, facing, up, .. } = draped;
     let mut pressures = vec![0.0; x.len()];
     for slope in slopes {
         let [i, j] = slope.ends.map(|v| v as usize);
         let (edge, bend) = (x[i] - x[j], facing[i] - facing[j]);
         let out = (facing[i] + facing[j]) * 0.5;
         // Along the hang; where cloth lies on top of the body it hangs to all sides.
-        let (down, top) = (out * out.y - Vec3::y(), out.y.max(0.0));
+        let (down, top) = (out * out.dot(up) - up, out.dot(up).max(0.0));
         let depth = edge.dot(&down) * bend.dot(&down) + 0.5 * top * top * edge.dot(&bend);
         for v in [i, j] {
             pressures[v] += 0.5 * TAUT * slope.stiffness * depth;
@@ -74,21 +74,16 @@ pub(super) fn pressures(draped: &Draped<'_>, slopes: &[Slope]) -> Vec<f64> {
 mod tests {
     use super::super::tests::revolved;
     use super::*;
-    use crate::body::{Body, FileFrame};
-    use crate::geometry::ClosestPoint;
     use crate::geometry::closest_point::tests::sphere;
+    use crate::geometry::mesh::rings;
+    use crate::geometry::{ClosestPoint, Vec3};
 
     fn pressed(radius: impl Fn(f64) -> f64) -> f64 {
         let cloth = revolved(radius, false);
-        let body = Body {
-            name: "ball".to_owned(),
-            mesh: sphere(0.1, 3),
-            frame: FileFrame::SI,
-            notes: Vec::new(),
-        };
-        let surface = ClosestPoint::new(&body.mesh);
-        let mut draped = Draped::new(&cloth.positions, &cloth.triangles, (&body, &surface));
-        draped.height = 1.0;
+        let surface = ClosestPoint::new(&sphere(0.1, 3));
+        let rings = rings(cloth.positions.len(), &cloth.triangles);
+        let mesh = (&cloth.triangles[..], &rings[..]);
+        let draped = Draped::new(&cloth.positions, mesh, &surface, (Vec3::y(), 1.0));
         let carried = |p: &Vec3| Carried {
             point: *p,
             ease: 1.0,

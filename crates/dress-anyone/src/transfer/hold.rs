@@ -198,8 +198,9 @@ mod tests {
             sizes: vec![edge; x.len()],
             distance: vec![0.0; x.len()],
             facing: vec![Vec3::y(); x.len()],
+            up: Vec3::y(),
             height: 1.0,
-            rings: rings(x.len(), &triangles),
+            rings: &rings(x.len(), &triangles),
         };
         let bound = |p: &Vec3| Carried {
             point: *p,

@@ -11,7 +11,7 @@ pub(super) fn wanted(
     x: &[Vec3],
     distance: &[f64],
     bound: &[Carried],
-    [source, target]: &[ClosestPoint; 2],
+    [source, target]: [&ClosestPoint; 2],
 ) -> Vec<f64> {
     let of_one = |v: usize| {
         let (before, carried) = (distance[v], &bound[v]);
@@ -62,7 +62,7 @@ mod tests {
                 normals: [Vec3::x(); 2],
                 map: crate::geometry::Mat3::identity(),
             };
-            wanted(&[x], &[distance], &[carried], &[walls(from), walls(to)])[0]
+            wanted(&[x], &[distance], &[carried], [&walls(from), &walls(to)])[0]
         };
         // Room enough; half of 4 mm; as on the source.
         for (from, to, distance, expected) in [

@@ -16,7 +16,7 @@ pub(super) struct Settling<'a> {
     pub(super) relaxation: Relaxation,
     /// The target.
     pub(super) body: &'a ClosestPoint,
-    pub(super) bound: &'a [Carried],
+    pub(super) bound: Vec<Carried>,
     pub(super) grounds: Vec<Ground>,
     /// The loop ends when nothing moves farther \[m\].
     pub(super) still: f64,

@@ -3,8 +3,8 @@
 use super::*;
 use crate::body::FileFrame;
 use crate::check::noise;
-use crate::geometry::TriangleMesh;
 use crate::geometry::closest_point::tests::sphere;
+use crate::geometry::{ClosestPoint, TriangleMesh};
 
 fn body(mesh: TriangleMesh) -> Body {
     Body {
