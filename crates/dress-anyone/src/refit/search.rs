@@ -128,7 +128,7 @@ impl<'s, S: Surface> Search<'s, S> {
         run: &mut Run<'_, '_>,
     ) -> Result<Settled, Failed> {
         let mut best: Option<Box<Point<'s>>> = None;
-        let mut failed = Failed::NEVER_TRIED;
+        let mut failed = Failed::STOPPED;
         for guess in guesses {
             let beaten = best.as_ref().map_or(f64::INFINITY, |best| best.total);
             match self.trial(&guess.zeta, guess.x, beaten, usize::MAX, run) {

@@ -67,8 +67,8 @@ pub(in crate::refit) struct Point<'a> {
 }
 
 impl Failed {
-    /// What nothing was tried for.
-    pub(super) const NEVER_TRIED: Self = Self {
+    /// Stopped before there was anything to tell.
+    pub(super) const STOPPED: Self = Self {
         status: RestStatus::Stopped,
         residual: f64::NAN,
         broken: None,
@@ -127,8 +127,8 @@ impl<'s, S: Surface> Search<'s, S> {
         self.draped(zeta, start, all, run)
     }
 
-    /// The same with its gradient, if its loss is below `wanted`: what is not when the cloth is almost at rest is not draped to
-    /// its end, nor is what takes more than `patience` factorisations.
+    /// The same with its gradient, if its loss is below `wanted`: what is not when the cloth is almost at
+    /// rest is not draped to its end, nor is what takes more than `patience` factorisations.
     pub(super) fn trial(
         &self,
         zeta: &[f64],
@@ -220,7 +220,7 @@ impl<'s, S: Surface> Search<'s, S> {
     ) -> Result<End<'s, S>, Failed> {
         let steps = self.scene.params.step.steps();
         let found = Trajectory::run(self.scene, x_bar, start, steps, &mut |p| run.drapes(p));
-        let found = found.ok_or(Failed::NEVER_TRIED)?;
+        let found = found.ok_or(Failed::STOPPED)?;
         let (residual, broken) = (found.residual(), found.broken());
         if broken.is_some() || !residual.is_finite() {
             return Err(Failed {
@@ -255,8 +255,8 @@ impl<'s, S: Surface> Search<'s, S> {
         Ok((gradient, adjoint_norm))
     }
 
-    /// The candidate with its gradient, if that does not break down. Its stiffness is factored anew from its positions alone, so
-    /// that a resumed search goes on with the same bits.
+    /// The candidate with its gradient, if that does not break down. Its stiffness is factored anew from its
+    /// positions alone, so that a resumed search goes on with the same bits.
     pub(in crate::refit) fn accept(
         &self,
         mut candidate: Candidate<'s, S>,
