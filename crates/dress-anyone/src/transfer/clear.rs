@@ -6,6 +6,7 @@
 //! parts of the body face each other, cloth stays on the side of the middle where it belongs: the legs of
 //! trousers do not go through each other.
 
+use super::bind::smoothstep;
 use crate::geometry::box_tree::{BoxTree, around};
 use crate::geometry::intersections::intersect;
 use crate::geometry::{ClosestPoint, TriangleMesh, Vec3};
@@ -107,17 +108,16 @@ impl<'a> Clearing<'a> {
         moved.contains(&true)
     }
 
-    /// The way of vertex `v`, at `x`, home and out to the distance `least`.
+    /// The way of vertex `v`, at `x`, home and out to the distance `least`, or to the middle where another part of the
+    /// body leaves less room.
     fn push(&self, v: usize, x: Vec3, least: f64) -> Vec3 {
         let home = self.homeward(x, self.homes[v]);
         let now = self.body.signed_distance(home);
-        let missing = (least - now).max(0.0);
-        let out = if missing > 0.0 {
-            self.out(home)
-        } else {
-            Vec3::zeros()
-        };
-        home + out * missing - x
+        if now >= least {
+            return home - x;
+        }
+        let out = home + self.out(home) * (least - now);
+        self.homeward(out, self.homes[v]) - x
     }
 
     /// The way out of the body, as mean of those a step from `x` to both sides, along the edges of the body's triangle
@@ -137,13 +137,15 @@ impl<'a> Clearing<'a> {
     /// `x`, moved back towards where it belongs until the body below it is what it should be: some way
     /// past the middle of the gap.
     fn homeward(&self, x: Vec3, home: Vec3) -> Vec3 {
-        if belongs(self.body, x, home) {
+        let reach = FARTHEST * self.step;
+        let near = self.body.signed_distance(x) < reach;
+        if !near || belongs(self.body, x, home) {
             return x;
         }
         let mut way = self.step;
         while !belongs(self.body, x - home * way, home) {
             way *= 2.0;
-            if way > FARTHEST * self.step {
+            if way > reach {
                 return x;
             }
         }
@@ -156,7 +158,9 @@ impl<'a> Clearing<'a> {
                 near = middle;
             }
         }
-        x - home * (far + self.step)
+        let away = self.body.signed_distance(x) / reach;
+        let share = 1.0 - smoothstep(2.0 * away - 1.0);
+        x - home * ((far + self.step) * share)
     }
 
     /// Applies `pushes`; where the mean of those around, times `share`, is larger, that.
@@ -170,6 +174,11 @@ impl<'a> Clearing<'a> {
                 pushes[v]
             };
         }
+    }
+
+    /// How many triangles of the cloth at `x` meet the body.
+    pub(super) fn meetings(&self, x: &[Vec3]) -> usize {
+        self.met(x).len()
     }
 
     /// Triangles of the cloth that meet the body, each with the way out.
@@ -252,19 +261,31 @@ mod tests {
         assert!(farthest < 0.303 + 0.03, "{farthest}");
     }
 
-    #[test]
-    fn the_legs_of_trousers_stay_on_their_sides() {
+    /// Where a vertex of the left of two legs, whose faces are at x = 0 and `gap` \[m\], goes from `start` when it shall be
+    /// `least` away from both.
+    fn cleared_between_legs(gap: f64, start: f64, least: f64) -> f64 {
         let mut skin = TriangleMesh::default();
         add_box(&mut skin, [-1.0, -1.0, -1.0], [0.0, 1.0, 1.0]);
-        add_box(&mut skin, [0.01, -1.0, -1.0], [1.0, 1.0, 1.0]);
+        add_box(&mut skin, [gap, -1.0, -1.0], [1.0, 1.0, 1.0]);
         let body = ClosestPoint::new(&skin);
-        // Of the left leg, 8 mm away from it and 2 mm from the right one.
-        let mut x = vec![Vec3::new(0.008, 0.0, 0.0)];
+        let mut x = vec![Vec3::new(start, 0.0, 0.0)];
         let rings = [Vec::new()];
         let clearing = Clearing::new(&body, &skin, &[], &rings, vec![Vec3::x()], 5e-4);
-        clearing.clear(&mut x, &mut [1e-3]);
-        // The middle is at 5 mm; a step before it.
-        assert!((x[0].x - 4.5e-3).abs() < 1e-4, "{}", x[0].x);
+        clearing.clear(&mut x, &mut [least]);
+        x[0].x
+    }
+
+    #[test]
+    fn the_legs_of_trousers_stay_on_their_sides() {
+        // 8 mm away from its own leg and 2 mm from the other: the middle is at 5 mm; a step before it.
+        let x = cleared_between_legs(0.01, 8e-3, 1e-3);
+        assert!((x - 4.5e-3).abs() < 1e-4, "{x}");
+        // Where there is no room for both layers at their least distance, each keeps its half.
+        let x = cleared_between_legs(4e-3, 1e-3, 3e-3);
+        assert!((x - 1.5e-3).abs() < 1e-4, "{x}");
+        // Far from either, cloth may be where it is.
+        let x = cleared_between_legs(0.2, 0.15, 3e-3);
+        assert!((x - 0.15).abs() < 1e-12, "{x}");
     }
 
     #[test]

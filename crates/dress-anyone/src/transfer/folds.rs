@@ -28,6 +28,8 @@ const ROUNDS: usize = 16;
 const PATIENCE: usize = 8;
 /// Farthest that cloth is drawn, in first steps: 1 cm on an adult.
 const FARTHEST: f64 = 20.0;
+/// Part of its least distance to the body that is left to what met, each time: there is no room for two layers.
+const CROWDED: f64 = 0.5;
 /// Power of the gap by which directions that part two triangles count: the widest decides, and two that are as wide
 /// do so together.
 const SHARP: i32 = 8;
@@ -45,7 +47,7 @@ impl<'a> Folds<'a> {
 
     /// Vertices around the triangles that meet in `x` and did not in the drape.
     pub(super) fn around_meetings(&self, x: &[Vec3]) -> BTreeSet<u32> {
-        let pairs = self.meetings(x);
+        let pairs = self.pairs(x);
         let meeting = pairs.iter().flatten();
         let meeting = meeting.flat_map(|t| self.triangles[*t as usize]);
         let mut around: BTreeSet<u32> = meeting.collect();
@@ -65,23 +67,30 @@ impl<'a> Folds<'a> {
         turns: &[Mat3],
         (clearing, least): (&Clearing<'_>, &mut [f64]),
     ) {
-        let mut fewest = self.meetings(x).len();
+        let mut fewest = self.meetings(x);
         let (start, mut tried) = (x.clone(), x.clone());
         for _ in 0..PARTINGS {
             if fewest == 0 {
                 break;
             }
+            let mut crowded = BTreeSet::new();
             for round in 0..ROUNDS {
                 let step = clearing.step * (1 + round / PATIENCE) as f64;
-                if !self.draw(&mut tried, turns, step, clearing) {
+                let met = self.draw(&mut tried, turns, step, clearing);
+                if met.is_empty() {
                     break;
                 }
+                let met = met.iter().flatten();
+                crowded.extend(met.flat_map(|t| self.triangles[*t as usize]));
                 for (x, start) in tried.iter_mut().zip(&start) {
                     *x = start + (*x - start).cap_magnitude(FARTHEST * clearing.step);
                 }
             }
+            for v in crowded {
+                least[v as usize] *= CROWDED;
+            }
             clearing.clear(&mut tried, least);
-            let left = self.meetings(&tried).len();
+            let left = self.meetings(&tried);
             if left < fewest {
                 fewest = left;
                 x.clone_from(&tried);
@@ -89,9 +98,15 @@ impl<'a> Folds<'a> {
         }
     }
 
-    /// One step of drawing apart; whether anything met.
-    fn draw(&self, x: &mut [Vec3], turns: &[Mat3], step: f64, clearing: &Clearing<'_>) -> bool {
-        let pairs = self.meetings(x);
+    /// One step of drawing apart what meets, which it gives back.
+    fn draw(
+        &self,
+        x: &mut [Vec3],
+        turns: &[Mat3],
+        step: f64,
+        clearing: &Clearing<'_>,
+    ) -> Vec<[u32; 2]> {
+        let pairs = self.pairs(x);
         let mut sums = vec![(Vec3::zeros(), 0.0); x.len()];
         for pair in &pairs {
             let pair = pair.map(|t| self.triangles[t as usize]);
@@ -112,11 +127,16 @@ impl<'a> Folds<'a> {
         let mean = |(sum, count): &(Vec3, f64)| sum / f64::max(*count, 1.0);
         let pushes: Vec<Vec3> = sums.iter().map(mean).collect();
         clearing.spread(x, &pushes, 0.5);
-        !pairs.is_empty()
+        pairs
     }
 
-    /// Pairs of triangles that meet in `x` and did not in the drape.
-    fn meetings(&self, x: &[Vec3]) -> Vec<[u32; 2]> {
+    /// How many pairs of triangles meet in `x` and did not in the drape.
+    pub(super) fn meetings(&self, x: &[Vec3]) -> usize {
+        self.pairs(x).len()
+    }
+
+    /// Those pairs.
+    fn pairs(&self, x: &[Vec3]) -> Vec<[u32; 2]> {
         let mut pairs = within(x, self.triangles);
         pairs.retain(|pair| !self.before.contains(pair));
         pairs

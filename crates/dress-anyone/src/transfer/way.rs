@@ -33,6 +33,8 @@ pub(super) struct Skin {
     /// With parts that go through each other drawn apart.
     mesh: TriangleMesh,
     pub(super) surface: ClosestPoint,
+    /// As it is, where that is another.
+    whole: Option<(TriangleMesh, ClosestPoint)>,
 }
 
 /// A drape on its way from a source to a target.
@@ -42,6 +44,8 @@ pub(super) struct Way<'a> {
     kept: &'a [[u32; 2]],
     settling: Settling<'a>,
     clearing: Clearing<'a>,
+    /// By the target with its parts as they are, where they go through each other.
+    whole: Option<Clearing<'a>>,
     folds: Folds<'a>,
     /// How the body around each vertex turns at large.
     turns: Vec<Mat3>,
@@ -64,7 +68,13 @@ impl Skin {
     pub(super) fn of(body: &Body) -> Self {
         let mesh = parted(&body.mesh);
         let surface = ClosestPoint::new(&mesh);
-        Self { mesh, surface }
+        let other = mesh != body.mesh;
+        let whole = other.then(|| (body.mesh.clone(), ClosestPoint::new(&body.mesh)));
+        Self {
+            mesh,
+            surface,
+            whole,
+        }
     }
 
     /// How far it reaches along `up` \[m\].
@@ -118,19 +128,24 @@ impl<'a> Way<'a> {
             let home = belongs(&source.surface, *x, before);
             if home { after } else { Vec3::zeros() }
         };
-        let homes = bound.iter().zip(drape).map(home).collect();
-        let least = |ground: &Ground| ground.wanted.clamp(0.0, params.thickness);
-        let (low, high) = bounds(drape);
-        Self {
-            least: grounds.iter().map(least).collect(),
-            clearing: Clearing::new(
-                &target.surface,
-                &target.mesh,
+        let homes: Vec<Vec3> = bound.iter().zip(drape).map(home).collect();
+        let clearing = |mesh: &'a TriangleMesh, surface: &'a ClosestPoint| {
+            let homes = homes.clone();
+            Clearing::new(
+                surface,
+                mesh,
                 &layout.triangles,
                 rings,
                 homes,
                 STEP * height,
-            ),
+            )
+        };
+        let least = |ground: &Ground| ground.wanted.clamp(0.0, params.thickness);
+        let (low, high) = bounds(drape);
+        Self {
+            least: grounds.iter().map(least).collect(),
+            clearing: clearing(&target.mesh, &target.surface),
+            whole: (target.whole.as_ref()).map(|(mesh, surface)| clearing(mesh, surface)),
             folds: Folds::new(drape, &layout.triangles, rings),
             settling: Settling {
                 relaxation: Relaxation::new(drape, &stencils, &usual, springs),
@@ -203,11 +218,26 @@ impl<'a> Way<'a> {
         }
     }
 
-    /// Takes `x` out of the target, and draws its layers apart.
-    pub(super) fn clear(&mut self, x: &mut Vec<Vec3>) {
-        self.clearing.clear(x, &mut self.least);
-        let clearing = (&self.clearing, &mut self.least[..]);
-        self.folds.draw_apart(x, &self.turns, clearing);
+    /// Takes `x` out of the target, and draws its layers apart; then out of the target's parts as they are, where that
+    /// helps: between two that overlap nothing can lie.
+    pub(super) fn clear(&self, x: &mut Vec<Vec3>) {
+        self.clear_by(&self.clearing, x);
+        if let Some(whole) = &self.whole {
+            let mut tried = x.clone();
+            self.clear_by(whole, &mut tried);
+            let [before, after] =
+                [&*x, &tried].map(|x| [whole.meetings(x), self.folds.meetings(x)]);
+            if after[0] < before[0] && after[1] <= before[1] {
+                *x = tried;
+            }
+        }
+    }
+
+    fn clear_by(&self, clearing: &Clearing<'a>, x: &mut Vec<Vec3>) {
+        let mut least = self.least.clone();
+        clearing.clear(x, &mut least);
+        self.folds
+            .draw_apart(x, &self.turns, (clearing, &mut least));
     }
 }
 
