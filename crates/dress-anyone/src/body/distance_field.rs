@@ -159,11 +159,16 @@ impl DistanceField {
                 let y = local[1] + j;
                 let corner = corner_at([local[0], y, z]);
                 let at = (z % SIDE * SIDE + y % SIDE) * SIDE;
-                let start = starts[corner] + at + local[0];
-                let (here, beyond) = row.split_at_mut(SIDE.min(local[0] + 4) - local[0]);
-                here.copy_from_slice(&self.values[start..start + here.len()]);
-                let start = starts[corner | 1] + at;
-                beyond.copy_from_slice(&self.values[start..start + beyond.len()]);
+                let here = starts[corner] + at + local[0];
+                if local[0] + 4 <= SIDE {
+                    row.copy_from_slice(&self.values[here..here + 4]);
+                    continue;
+                }
+                let beyond = starts[corner | 1] + at;
+                for (value, i) in row.iter_mut().zip(local[0]..) {
+                    let place = i.checked_sub(SIDE);
+                    *value = self.values[place.map_or(here + i - local[0], |i| beyond + i)];
+                }
             }
         }
         Some((coefficients, t))

@@ -2,6 +2,7 @@
 //! initial scale (§4.6), the body to drape on and the loss (§4.4).
 
 use super::dress::holds;
+use super::search::aside::Spare;
 use super::search::point::Failed;
 use super::search::{self, Search};
 use super::{Clock, Observer, RefitError, RefitParams, drape_to_rest};
@@ -43,6 +44,7 @@ pub(super) struct Prepared<'a> {
     pub(super) losses: Losses,
     /// ∂x̄ along each unknown, `[unknown][pattern vertex]`.
     pub(super) motions: Vec<Vec<Vec2>>,
+    pub(super) spare: Spare,
 }
 
 impl<'a> Prepared<'a> {
@@ -59,19 +61,22 @@ impl<'a> Prepared<'a> {
             return Err(RefitError::Garment(problems));
         }
         let mesh = &garment.mesh;
-        let (source_drape, x_star) = if let Some(x_star) = x_star {
-            (on_source(garment, source, params, clock, observe)?, x_star)
-        } else {
-            let layout = Layout::of(garment, &params.transfer).map_err(RefitError::Garment)?;
+        let layout = Layout::of(garment, &params.transfer).map_err(RefitError::Garment)?;
+        let field =
+            || DistanceField::new(&target.mesh, DistanceField::SPACING, DistanceField::OUTER);
+        let aim = || {
             let source_drape = on_source(garment, source, params, clock, observe)?;
-            clock.stage("target shape", observe);
-            let aim = target_shape(&source_drape, &layout, source, target, &params.transfer)?;
-            (source_drape, aim.x_star)
+            let x_star = if let Some(x_star) = x_star {
+                x_star
+            } else {
+                clock.stage("target shape", observe);
+                target_shape(&source_drape, &layout, source, target, &params.transfer)?.x_star
+            };
+            clock.stage("target body", observe);
+            Ok::<_, RefitError>((source_drape, x_star))
         };
-
-        clock.stage("target body", observe);
-        let surface =
-            DistanceField::new(&target.mesh, DistanceField::SPACING, DistanceField::OUTER);
+        let (aim, surface) = Spare::all().both(aim, field);
+        let (source_drape, x_star) = aim?;
 
         clock.stage("cages", observe);
         let symmetry = params
@@ -110,6 +115,7 @@ impl<'a> Prepared<'a> {
             motions: search::newton::motions(&cages, mesh),
             source_drape,
             x_star,
+            spare: Spare::all(),
             held,
             symmetry,
             cages,
@@ -171,6 +177,7 @@ impl<'a> Prepared<'a> {
             params: &self.params.descent,
             motions: &self.motions,
             guide: 0.0,
+            spare: &self.spare,
             keep: None,
         }
     }

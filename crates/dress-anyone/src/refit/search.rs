@@ -4,6 +4,7 @@
 //! ([`downhill`]); whatever makes it, a step is accepted only when the new rest shape can be cut
 //! ([`guards`]), its drape does not fail, and the loss falls.
 
+pub(super) mod aside;
 mod downhill;
 pub(super) mod guards;
 pub(super) mod newton;
@@ -20,6 +21,7 @@ use crate::pattern::PatternMesh;
 use crate::report::Ending;
 use crate::sim::Scene;
 use crate::sim::energy::contact::Surface;
+use aside::Spare;
 use guards::{farthest, quality_floor};
 use nalgebra::DVector;
 use point::{Failed, Point};
@@ -44,6 +46,8 @@ pub(super) struct Search<'a, S> {
     pub(super) params: &'a DescentParams,
     /// Rate of the guides in this scene's cloth \[1/s²\], for the record.
     pub(super) guide: f64,
+    /// Cores for trials aside.
+    pub(super) spare: &'a Spare,
     /// What to note in checkpoints besides the search; none to make none.
     pub(super) keep: Option<Keep<'a>>,
 }

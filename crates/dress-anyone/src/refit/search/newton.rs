@@ -1,7 +1,7 @@
 //! Levenberg–Marquardt steps: from the sensitivities of the drape at hand, by every unknown.
 
 use super::guards::{can_be_cut, without};
-use super::point::Point;
+use super::point::{Failed, Point};
 use super::{Run, Search, Stepped};
 use crate::cage::Cages;
 use crate::descent::{Damping, Model};
@@ -10,10 +10,72 @@ use crate::loss::Row;
 use crate::pattern::PatternMesh;
 use crate::sim::energy::contact::Surface;
 use crate::sim::equilibrium::RestStatus;
+use nalgebra::DVector;
+
+/// Ever shorter steps from a point, as the model gives them with ever more damping.
+struct Shorter<'a, 's, S> {
+    search: &'a Search<'s, S>,
+    best: &'a Point<'a>,
+    model: &'a Model,
+    /// Steps that move a panel as a whole.
+    rigid: &'a [Vec<f64>],
+    /// Least quality of triangles.
+    floor: f64,
+    /// Of the next step.
+    damping: Damping,
+    /// Steps given.
+    given: usize,
+}
+
+/// A step to try.
+struct Try {
+    zeta: Vec<f64>,
+    step: DVector<f64>,
+    damping: Damping,
+}
+
+impl<S> Clone for Shorter<'_, '_, S> {
+    fn clone(&self) -> Self {
+        Self { ..*self }
+    }
+}
+
+impl<S: Surface> Shorter<'_, '_, S> {
+    /// The next step that promises a fall to speak of, with a pattern that can be cut.
+    fn next<'p>(&mut self) -> Result<Try, Stepped<'p>> {
+        let Self { search, best, .. } = *self;
+        while self.given < search.params.refusals {
+            let damping = self.damping;
+            let Some(mut step) = self.model.step(damping.0) else {
+                break;
+            };
+            without(&mut step, self.rigid);
+            let Some(zeta) = search.within_reach(best, &mut step) else {
+                break;
+            };
+            if self.model.promise(&step) < search.params.tolerance * best.total {
+                return Err(match self.given {
+                    0 => Stepped::Level,
+                    _ => Stepped::NoBetter,
+                });
+            }
+            self.damping.tighten();
+            if can_be_cut(search.cages, search.mesh, &zeta, self.floor) {
+                self.given += 1;
+                return Ok(Try {
+                    zeta,
+                    step,
+                    damping,
+                });
+            }
+        }
+        Err(Stepped::NoBetter)
+    }
+}
 
 impl<'s, S: Surface> Search<'s, S> {
     /// Tries ever shorter steps from `best` until the loss falls, as long as they promise a fall to speak
-    /// of. A pattern that cannot be cut costs no drape.
+    /// of, two at a time where there is a core to spare. A pattern that cannot be cut costs no drape.
     pub(super) fn newton(
         &self,
         best: &Point<'_>,
@@ -22,38 +84,51 @@ impl<'s, S: Surface> Search<'s, S> {
         run: &mut Run<'_, '_>,
     ) -> Stepped<'s> {
         let model = self.model(best);
-        let rigid = self.cages.rigid_modes(&best.zeta);
-        let mut refusals = 0;
-        while refusals < self.params.refusals {
-            let Some(mut step) = model.step(damping.0) else {
-                break;
+        let mut shorter = Shorter {
+            search: self,
+            best,
+            model: &model,
+            rigid: &self.cages.rigid_modes(&best.zeta),
+            floor,
+            damping: *damping,
+            given: 0,
+        };
+        let draped = |tried: &Try, run: &mut Run<'_, '_>| {
+            let start = self.predict(best, &tried.step);
+            self.trial(&tried.zeta, start, best.total, self.params.patience, run)
+        };
+        let mut made = None;
+        loop {
+            let tried = match shorter.next() {
+                Ok(tried) => tried,
+                Err(ended) => return ended,
             };
-            without(&mut step, &rigid);
-            let Some(zeta) = self.within_reach(best, &mut step) else {
-                break;
-            };
-            if model.promise(&step) < self.params.tolerance * best.total {
-                return match refusals {
-                    0 => Stepped::Level,
-                    _ => Stepped::NoBetter,
+            let found = if let Some(made) = made.take() {
+                run.count_made(made)
+            } else {
+                let after = shorter.clone().next().ok();
+                let after = after.map(|after| move |run: &mut Run<'_, '_>| draped(&after, run));
+                let enough = |found: &Result<Option<_>, Failed>| match found {
+                    Ok(better) => better.is_some(),
+                    Err(failed) => failed.status == RestStatus::Stopped,
                 };
-            }
-            if can_be_cut(self.cages, self.mesh, &zeta, floor) {
-                let start = self.predict(best, &step);
-                match self.trial(&zeta, start, best.total, self.params.patience, run) {
-                    Err(failed) if failed.status == RestStatus::Stopped => {
-                        return Stepped::Interrupted;
-                    }
-                    Ok(Some(next)) => {
-                        damping.relax();
-                        return Stepped::Better(next);
-                    }
-                    _ => refusals += 1,
+                let (found, aside) =
+                    run.beside(self.spare, |run| draped(&tried, run), after, enough);
+                made = aside;
+                found
+            };
+            match found {
+                Err(failed) if failed.status == RestStatus::Stopped => {
+                    return Stepped::Interrupted;
                 }
+                Ok(Some(next)) => {
+                    *damping = tried.damping;
+                    damping.relax();
+                    return Stepped::Better(next);
+                }
+                _ => {}
             }
-            damping.tighten();
         }
-        Stepped::NoBetter
     }
 
     /// The Gauss–Newton model at `best`: residuals of all terms by all unknowns, through drape and

@@ -1,6 +1,7 @@
 //! What a search tells and counts while it runs, through all its levels.
 
 use super::Search;
+use super::aside::Made;
 use super::point::Point;
 use crate::refit::checkpoint::Checkpoint;
 use crate::refit::{Clock, Observer, Progress};
@@ -67,6 +68,22 @@ impl<'a, 'b> Run<'a, 'b> {
     pub(in crate::refit) fn count(&mut self, drape: &Drape) {
         self.count_drape();
         self.count_factorisations(drape.iterations);
+    }
+
+    /// Gives what was found aside, with what it took.
+    pub(super) fn made<T>(&self, found: T) -> Made<T> {
+        Made {
+            found,
+            drapes: self.drapes,
+            factorisations: self.factorisations,
+        }
+    }
+
+    /// Counts what was made aside as done here.
+    pub(super) fn count_made<T>(&mut self, made: Made<T>) -> T {
+        self.drapes += made.drapes;
+        self.factorisations += made.factorisations;
+        made.found
     }
 
     /// Tells how a drape proceeds; whether to go on with it. Once stopped, what is left to drape is
