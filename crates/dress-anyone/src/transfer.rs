@@ -13,7 +13,8 @@
 //!    drape by: relaxing loses some of each change, and half of the loss is either way's. To first order
 //!    the way there and the way back are each other's inverse then (what Christensen & Johnson 2001 ask
 //!    of registrations of images).
-//! 6. Take it out of the body, and draw apart layers that met on the way (`folds`).
+//! 6. Take it out of the body, draw apart layers that met on the way (`folds`), and turn back what was turned
+//!    over (`turned`).
 //!
 //! Departures from the original: binding is to a smooth patch of body, not to a closest point, and
 //! rebinding restores distances along the normal only; the place along the body stays tied to the
@@ -32,6 +33,7 @@ mod paint;
 mod relax;
 mod room;
 mod settle;
+mod turned;
 mod way;
 
 use crate::body::Body;
@@ -42,6 +44,7 @@ pub use layout::{Layout, Zone};
 pub use paint::Paint;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
+pub(crate) use turned::turned_over;
 use way::{Skin, Way};
 
 /// How the drape is carried over.

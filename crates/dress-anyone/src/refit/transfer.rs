@@ -9,7 +9,7 @@ use crate::body::Body;
 use crate::garment::Garment;
 use crate::geometry::{ClosestPoint, Vec3, intersections};
 use crate::report::StageTime;
-use crate::transfer::{Layout, Paint, target_shape};
+use crate::transfer::{Layout, Paint, target_shape, turned_over};
 use serde::Serialize;
 
 /// A garment carried to another body.
@@ -138,7 +138,7 @@ pub fn transfer(
         converged: aim.converged,
         spacing: judge::spacing(garment, both, &bodies),
         stretch: judge::stretch(triangles, both),
-        turned_over: judge::turned_over(triangles, both),
+        turned_over: turned_over(triangles, [&source_drape, &aim.x_star]).len(),
         through_body,
         through_itself,
         seam_curvature: curvature(false),

@@ -8,6 +8,7 @@ use super::hold::{self, Rims};
 use super::layout::Layout;
 use super::relax::{Hold, Kept, Relaxation, Slope, Springs, Stencil};
 use super::settle::{Ground, Settling};
+use super::turned::{turn_back, turned_over};
 use super::{TransferParams, hang, layers, room};
 use crate::body::{Body, parted};
 use crate::geometry::groups::Groups;
@@ -22,6 +23,8 @@ const STEP: f64 = 3e-4;
 const LOOSENINGS: usize = 3;
 /// Times that a garment which met the body is relaxed again, to even out what was pushed.
 const SMOOTHINGS: usize = 2;
+/// Times that turned triangles are turned back.
+const TURNINGS: usize = 8;
 /// Part of what the way back misses that is taken back: the other half is the way back's own.
 const HALF: f64 = 0.5;
 /// Length over which that is averaged along the cloth, as share of the body's height: 5 cm. What single vertices miss is
@@ -40,6 +43,8 @@ pub(super) struct Skin {
 /// A drape on its way from a source to a target.
 pub(super) struct Way<'a> {
     draped: Draped<'a>,
+    triangles: &'a [[u32; 3]],
+    rings: &'a [Vec<u32>],
     /// Edges that keep their length.
     kept: &'a [[u32; 2]],
     settling: Settling<'a>,
@@ -157,6 +162,8 @@ impl<'a> Way<'a> {
             },
             turns,
             draped,
+            triangles: &layout.triangles,
+            rings,
             kept: &layout.kept,
             up: map.turn_of_all() * up,
         }
@@ -218,17 +225,41 @@ impl<'a> Way<'a> {
         }
     }
 
-    /// Takes `x` out of the target, and draws its layers apart; then out of the target's parts as they are, where that
-    /// helps: between two that overlap nothing can lie.
+    /// Takes `x` out of the target, draws its layers apart and turns back what was turned over; then once more by the
+    /// target's parts as they are, where that helps: between two that overlap nothing can lie.
     pub(super) fn clear(&self, x: &mut Vec<Vec3>) {
         self.clear_by(&self.clearing, x);
-        if let Some(whole) = &self.whole {
+        self.turn_back(x);
+        if let Some(whole) = (self.whole.as_ref()).filter(|whole| whole.meetings(x) > 0) {
             let mut tried = x.clone();
             self.clear_by(whole, &mut tried);
-            let [before, after] =
-                [&*x, &tried].map(|x| [whole.meetings(x), self.folds.meetings(x)]);
-            if after[0] < before[0] && after[1] <= before[1] {
+            if self.no_worse(whole, [x, &tried]) {
                 *x = tried;
+            }
+        }
+    }
+
+    /// Turns back triangles that were turned over, as long as that helps and nothing meets for it.
+    fn turn_back(&self, x: &mut Vec<Vec3>) {
+        let mut fewest = self.turned_over(x);
+        let (mut tried, mut turned) = (x.clone(), fewest.clone());
+        for _ in 0..TURNINGS {
+            if turned.is_empty() {
+                break;
+            }
+            turn_back(
+                &mut tried,
+                &turned,
+                self.triangles,
+                (self.draped.x, self.rings),
+            );
+            if self.clearing.meetings(&tried) > 0 {
+                self.clear_by(&self.clearing, &mut tried);
+            }
+            turned = self.turned_over(&tried);
+            if turned.len() < fewest.len() && self.no_worse(&self.clearing, [x, &tried]) {
+                x.clone_from(&tried);
+                fewest.clone_from(&turned);
             }
         }
     }
@@ -238,6 +269,16 @@ impl<'a> Way<'a> {
         clearing.clear(x, &mut least);
         self.folds
             .draw_apart(x, &self.turns, (clearing, &mut least));
+    }
+
+    fn turned_over(&self, x: &[Vec3]) -> Vec<usize> {
+        turned_over(self.triangles, [self.draped.x, x])
+    }
+
+    /// Whether after goes no more through the body and through itself than before.
+    fn no_worse(&self, clearing: &Clearing<'a>, [before, after]: [&[Vec3]; 2]) -> bool {
+        clearing.meetings(after) <= clearing.meetings(before)
+            && self.folds.meetings(after) <= self.folds.meetings(before)
     }
 }
 

@@ -158,7 +158,7 @@ mod tests {
         let mut clock = Clock::new();
         let mut no_more = |_: &Progress| false;
         let mut run = Run::new(&mut clock, &mut no_more);
-        let (_, made) = run.beside(&spare, |_| (), Some(second), |()| false);
+        let ((), made) = run.beside(&spare, |_| (), Some(second), |()| false);
         assert!(made.is_some() && run.stopped());
     }
 }

@@ -2,7 +2,7 @@
 
 use super::{BINS, Spacing, Spread};
 use crate::garment::Garment;
-use crate::geometry::{ClosestPoint, Mat3, Vec2, Vec3};
+use crate::geometry::{ClosestPoint, Vec2, Vec3};
 use crate::pattern::symmetry::Symmetry;
 use crate::refit::measure::principal_stretches;
 use crate::sim::energy::membrane::RestTriangle;
@@ -71,50 +71,6 @@ fn laid_flat([a, b, c]: [Vec3; 3]) -> [Vec2; 3] {
     ]
 }
 
-/// Triangles whose normal is turned by more than a right angle against the rotation that takes the cloth
-/// around them closest to where it goes.
-pub(super) fn turned_over(triangles: &[[u32; 3]], [before, after]: Both<'_>) -> usize {
-    let mut around = vec![BTreeSet::new(); before.len()];
-    for t in triangles {
-        for v in t {
-            around[*v as usize].extend(*t);
-        }
-    }
-    let normal = |x: &[Vec3], t: &[u32; 3]| {
-        let [a, b, c] = t.map(|v| x[v as usize]);
-        (b - a).cross(&(c - a))
-    };
-    let turned = |t: &&[u32; 3]| {
-        let patch: BTreeSet<u32> = t
-            .iter()
-            .flat_map(|v| &around[*v as usize])
-            .copied()
-            .collect();
-        let rotation = rotation(&patch, before, after);
-        (rotation * normal(before, t)).dot(&normal(after, t)) < 0.0
-    };
-    triangles.iter().filter(turned).count()
-}
-
-/// The rotation that takes a patch of `x` closest to that of `y` (Kabsch 1976).
-fn rotation(patch: &BTreeSet<u32>, x: &[Vec3], y: &[Vec3]) -> Mat3 {
-    let middle = |x: &[Vec3]| -> Vec3 {
-        let sum: Vec3 = patch.iter().map(|v| x[*v as usize]).sum();
-        sum / patch.len() as f64
-    };
-    let (from, to) = (middle(x), middle(y));
-    let spread: Mat3 = (patch.iter())
-        .map(|v| (y[*v as usize] - to) * (x[*v as usize] - from).transpose())
-        .sum();
-    let svd = spread.svd(true, true);
-    let (Some(u), Some(v_t)) = (svd.u, svd.v_t) else {
-        return Mat3::identity();
-    };
-    let mut upright = Mat3::identity();
-    upright[(2, 2)] = (u.determinant() * v_t.determinant()).signum();
-    u * upright * v_t
-}
-
 /// Turn per length of the pattern's rims, or else of its seams \[1/m\].
 pub(super) fn curvature(garment: &Garment, x: &[Vec3], rims: bool) -> f64 {
     let mesh = &garment.mesh;
@@ -169,7 +125,6 @@ pub(super) fn asymmetry(garment: &Garment, source_drape: &[Vec3], x: &[Vec3]) ->
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::check::noise;
     use crate::loss::fixtures::two_panels;
 
     #[test]
@@ -188,33 +143,5 @@ mod tests {
         for (found, expected) in [(low.least, 0.5), (low.most, 0.5), (high.least, 2.0)] {
             assert!((found - expected).abs() < 1e-9);
         }
-    }
-
-    #[test]
-    fn one_vertex_thrown_across_its_ring_turns_triangles_over_and_motions_do_not() {
-        let (_, mesh) = two_panels();
-        let count = mesh.panel_vertices[0].end;
-        let rough = |(i, p): (usize, &Vec2)| Vec3::new(p.x, p.y, 2e-3 * noise(i));
-        let before: Vec<Vec3> = mesh.x_bar.iter().enumerate().map(rough).collect();
-        let triangles = &mesh.triangles[mesh.panel_triangles[0].clone()];
-        let turn = nalgebra::Rotation3::from_euler_angles(2.0, 1.0, 0.3);
-        let mut after: Vec<Vec3> = before.iter().map(|p| turn * p * 1.3).collect();
-        assert_eq!(turned_over(triangles, [&before, &after]), 0);
-        // Past the far side of an inner vertex' ring.
-        let inner = (0..count).max_by_key(|v| {
-            triangles
-                .iter()
-                .filter(|t| t.contains(&(*v as u32)))
-                .count()
-        });
-        let v = inner.expect("a panel has vertices");
-        let across = triangles
-            .iter()
-            .find(|t| t.contains(&(v as u32)))
-            .expect("it is used");
-        let others = across.iter().filter(|w| **w as usize != v);
-        let middle: Vec3 = others.map(|w| after[*w as usize]).sum::<Vec3>() / 2.0;
-        after[v] = middle * 1.5 - after[v] * 0.5;
-        assert!(turned_over(triangles, [&before, &after]) > 0);
     }
 }
