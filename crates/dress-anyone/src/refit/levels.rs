@@ -26,6 +26,8 @@ const RATES: [f64; 2] = [1000.0, 100.0];
 const LET_DOWN: [f64; 3] = [1000.0, 100.0, 10.0];
 /// Most Levenberg–Marquardt steps of a guided level; the next takes them up.
 const GUIDED_STEPS: usize = 4;
+/// Residual at which guided cloth is at rest \[–\].
+const GUIDED_REST: f64 = 1e-2;
 /// Falls of the loss not worth another step in guided cloth \[–\].
 const GUIDED_TOLERANCE: f64 = 1e-2;
 
@@ -228,7 +230,11 @@ impl Level {
         let mut params = on.params.descent;
         let free = on.scene();
         let mut cloth = free.cloth.clone();
+        let mut sim = *free.params;
         if self.rate > 0.0 {
+            let rest = &mut sim.equilibrium;
+            rest.tolerance = rest.tolerance.max(GUIDED_REST);
+            rest.polished = rest.polished.max(GUIDED_REST);
             cloth = cloth.guided(on.x_star.clone(), self.rate);
             params.tolerance = params.tolerance.max(GUIDED_TOLERANCE);
             if params.optimizer == Optimizer::Lm {
@@ -241,6 +247,7 @@ impl Level {
         }
         let scene = Scene {
             cloth: &cloth,
+            params: &sim,
             ..free
         };
         let search = Search {
