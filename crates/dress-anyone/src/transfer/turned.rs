@@ -2,6 +2,7 @@
 //! an armpit. They are turned back.
 
 use crate::geometry::{Mat3, Vec3};
+use rayon::prelude::*;
 use std::collections::BTreeSet;
 
 /// Triangles whose normal is turned by more than a right angle against the rotation that takes the cloth around them
@@ -27,6 +28,7 @@ pub(crate) fn turned_over(triangles: &[[u32; 3]], [before, after]: [&[Vec3]; 2])
         (rotation * normal(before, t)).dot(&normal(after, t)) < 0.0
     };
     (0..triangles.len())
+        .into_par_iter()
         .filter(|t| turned(&triangles[*t]))
         .collect()
 }
