@@ -89,32 +89,20 @@ fn rotation(patch: &BTreeSet<u32>, x: &[Vec3], y: &[Vec3]) -> Mat3 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::check::noise;
-    use crate::geometry::Vec2;
+    use crate::geometry::closest_point::tests::sphere;
     use crate::geometry::mesh::rings;
-    use crate::loss::fixtures::two_panels;
 
-    /// A rough panel, the same turned and scaled, and an inner vertex.
-    fn panel() -> (Vec<[u32; 3]>, [Vec<Vec3>; 2], usize) {
-        let (_, mesh) = two_panels();
-        let count = mesh.panel_vertices[0].end;
-        let rough = |(i, p): (usize, &Vec2)| Vec3::new(p.x, p.y, 2e-3 * noise(i));
-        let before: Vec<Vec3> = mesh.x_bar.iter().enumerate().map(rough).collect();
-        let triangles = mesh.triangles[mesh.panel_triangles[0].clone()].to_vec();
+    /// A ball, the same turned and scaled, and one of its vertices.
+    fn ball() -> (Vec<[u32; 3]>, [Vec<Vec3>; 2], usize) {
+        let ball = sphere(0.1, 3);
         let turn = nalgebra::Rotation3::from_euler_angles(2.0, 1.0, 0.3);
-        let after = before.iter().map(|p| turn * p * 1.3).collect();
-        let triangles_of = |v: &usize| {
-            let of = triangles.iter().filter(|t| t.contains(&(*v as u32)));
-            of.count()
-        };
-        let inner = (0..count).max_by_key(triangles_of);
-        let inner = inner.expect("a panel has vertices");
-        (triangles, [before, after], inner)
+        let after = ball.positions.iter().map(|p| turn * p * 1.3).collect();
+        (ball.triangles, [ball.positions, after], 100)
     }
 
     #[test]
     fn a_vertex_thrown_across_its_ring_turns_triangles_over_and_motions_do_not() {
-        let (triangles, [before, mut after], v) = panel();
+        let (triangles, [before, mut after], v) = ball();
         assert!(turned_over(&triangles, [&before, &after]).is_empty());
         // Past the far side of its ring.
         let mut around = triangles.iter().filter(|t| t.contains(&(v as u32)));
@@ -127,7 +115,7 @@ mod tests {
 
     #[test]
     fn slivers_whose_near_corners_changed_places_are_turned_back() {
-        let (triangles, both, v) = panel();
+        let (triangles, both, v) = ball();
         let rings = rings(both[0].len(), &triangles);
         let w = rings[v][0] as usize;
         let [before, after] = both.map(|mut x| {
