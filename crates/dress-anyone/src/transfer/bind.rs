@@ -303,7 +303,7 @@ fn unit_normal([a, b, c]: [Vec3; 3]) -> Vec3 {
 }
 
 /// The rotation closest to `m`.
-fn rotation_of(m: Mat3) -> Mat3 {
+pub(super) fn rotation_of(m: Mat3) -> Mat3 {
     let svd = m.svd(true, true);
     let (Some(u), Some(v_t)) = (svd.u, svd.v_t) else {
         return Mat3::identity();

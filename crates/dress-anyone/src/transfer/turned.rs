@@ -1,6 +1,7 @@
 //! Triangles that were turned over on the way, slivers most of all: at a crotch that is pressed into a narrow cleft, in
 //! an armpit. They are turned back.
 
+use super::bind::rotation_of;
 use crate::geometry::{Mat3, Vec3};
 use rayon::prelude::*;
 use std::collections::BTreeSet;
@@ -77,13 +78,7 @@ fn rotation(patch: &BTreeSet<u32>, x: &[Vec3], y: &[Vec3]) -> Mat3 {
     let spread: Mat3 = (patch.iter())
         .map(|v| (y[*v as usize] - to) * (x[*v as usize] - from).transpose())
         .sum();
-    let svd = spread.svd(true, true);
-    let (Some(u), Some(v_t)) = (svd.u, svd.v_t) else {
-        return Mat3::identity();
-    };
-    let mut upright = Mat3::identity();
-    upright[(2, 2)] = (u.determinant() * v_t.determinant()).signum();
-    u * upright * v_t
+    rotation_of(spread)
 }
 
 #[cfg(test)]
