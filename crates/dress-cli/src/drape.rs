@@ -64,6 +64,9 @@ pub fn run(arguments: &DrapeArguments) -> Result<String, Failure> {
     });
     let seconds = start.elapsed().as_secs_f64();
     progress.close();
+    if let Some(folder) = &arguments.frames {
+        frames.write(&found.x, garment, &body, folder)?;
+    }
     let accepted = accept(&found, garment, &body);
     if found.status == RestStatus::Stopped && accepted.is_err() {
         return Err(RefitError::Stopped.into());
@@ -82,9 +85,6 @@ pub fn run(arguments: &DrapeArguments) -> Result<String, Failure> {
     };
     // What did not come to rest is worth a look, too.
     results(arguments, &loaded, &body, &found, &report)?.write()?;
-    if let Some(folder) = &arguments.frames {
-        frames.write(&found.x, garment, &body, folder)?;
-    }
     let steps_alone = refit.sim.solver == Solver::Xpbd && found.residual.is_finite();
     if !steps_alone {
         accepted?;

@@ -154,7 +154,7 @@ const PATIENCE: usize = 4;
 /// How often the points that feel the body are set more closely where a fold of skin comes through between
 /// them, and most iterations to settle again: one dress hovered just above the tolerance for hundreds, and settled
 /// in eight after the next halving.
-const HALVINGS: usize = 3;
+const HALVINGS: usize = 5;
 const SETTLING_AGAIN: usize = 150;
 
 /// A body, and what a garment on it is made of and held by.

@@ -49,6 +49,8 @@ pub enum Start {
         /// they start in are cut short there, and grow while they come together.
         short: Vec<Vec2>,
     },
+    /// Near, but layers go through each other. XPBD until they are apart.
+    Tangled,
     /// Near: a drape of a similar pattern, or the target shape. Static solve at once.
     Near,
 }
@@ -121,14 +123,21 @@ pub fn drape<S: Surface>(
 ) -> Drape {
     let rest = scene.cloth.at_rest(x_bar);
     let params = scene.params;
-    let begun_as = match start {
-        Start::Placed { short } => Some(short),
-        Start::Near if params.solver == Solver::Xpbd => Some(x_bar.to_vec()),
-        Start::Near => None,
+    let (short, steps) = match start {
+        Start::Placed { short } => (Some(short), params.step.steps()),
+        _ if params.solver == Solver::Xpbd => (Some(x_bar.to_vec()), params.step.steps()),
+        Start::Tangled => (Some(x_bar.to_vec()), 0),
+        Start::Near => (None, 0),
     };
-    let ((x, broken), sigma) = match begun_as {
+    let ((x, broken), sigma) = match short {
         Some(short) => (
-            gather(scene, &growth(scene.cloth, &short, x_bar), x, observe),
+            gather(
+                scene,
+                &growth(scene.cloth, &short, x_bar),
+                steps,
+                x,
+                observe,
+            ),
             params.equilibrium.cold,
         ),
         None => ((x, None), params.equilibrium.warm),
@@ -259,6 +268,8 @@ const STAGES: usize = 16;
 /// Gathering times that are spent on layers which go through each other: armpits, where the body presses,
 /// take long to untangle.
 const UNTANGLING: usize = 8;
+/// How far these may sink into the body meanwhile \[m\].
+const SINKS: f64 = 0.01;
 
 /// The rest from `short` to `x_bar` in stages; one stage if there is nothing to grow.
 fn growth(cloth: &Cloth, short: &[Vec2], x_bar: &[Vec2]) -> Vec<Rest> {
@@ -271,11 +282,12 @@ fn growth(cloth: &Cloth, short: &[Vec2], x_bar: &[Vec2]) -> Vec<Rest> {
     (STAGES - stages..=STAGES).map(grown).collect()
 }
 
-/// XPBD from rest at `x` for the configured time, through the stages of `growth`. Where positions stop being
-/// numbers, the last that were.
+/// XPBD from rest at `x` for so many `steps` at least, through the stages of `growth`. Where positions stop
+/// being numbers, the last that were.
 fn gather<S: Surface>(
     scene: &Scene<'_, S>,
     growth: &[Rest],
+    steps: usize,
     x: Vec<Vec3>,
     observe: &mut Observer<'_>,
 ) -> (Vec<Vec3>, Option<Broken>) {
@@ -290,17 +302,20 @@ fn gather<S: Surface>(
     );
     let v = vec![Vec3::zeros(); x.len()];
     let mut state = State { x, v };
-    let steps = step_params.steps();
-    for step in 0..UNTANGLING * steps {
+    let usual = step_params.steps();
+    for step in 0..UNTANGLING * usual {
         let enough = step >= steps && !stepper.tangled();
-        let progress = DrapeProgress::Gathering { step, steps };
+        let progress = DrapeProgress::Gathering { step, steps: usual };
         if enough || !observe(progress, &|| state.x.clone()) {
             break;
         }
-        let now = step as f64 / steps as f64;
+        let now = step as f64 / usual as f64;
         let grown = ((now - GROWING[0]) / (GROWING[1] - GROWING[0])).clamp(0.0, 1.0);
         let rest = &growth[(grown * (growth.len() - 1) as f64) as usize];
         stepper.grow(rest);
+        if step >= steps {
+            stepper.let_tangled_sink(SINKS);
+        }
         let before = state.x.clone();
         let left = 1.0 - now / INFLATED;
         stepper.step(&mut state, step_params.inflation * left.max(0.0));

@@ -25,6 +25,7 @@ use super::layers::Watch;
 use crate::geometry::Vec3;
 pub(super) use apart::Apart;
 use apart::Aparts;
+use contact::Look;
 use lanes::{Four, row};
 use part::{MOST, Part, Sweep};
 use serde::{Deserialize, Serialize};
@@ -102,6 +103,8 @@ pub struct Stepper<'a, S> {
     /// Positions before and in the step \[m\], with inverse masses \[1/kg\]; `[place]`.
     before: Vec<Four>,
     rows: Vec<Four>,
+    /// How far each vertex may sink into the body \[m\]; `[place]`.
+    sinks: Vec<f64>,
     /// Gradient by inverse masses of the steps walked back through, `[cloth vertex]`.
     w_hat: Vec<f64>,
 }
@@ -142,6 +145,7 @@ impl<'a, S: Surface> Stepper<'a, S> {
             place,
             before: vec![Four::default(); cloth.vertex_count],
             rows: Vec::new(),
+            sinks: vec![0.0; cloth.vertex_count],
             w_hat: Vec::new(),
         };
         stepper.take_on(rest);
@@ -168,6 +172,18 @@ impl<'a, S: Surface> Stepper<'a, S> {
     /// Whether layers still went through each other when last looked at.
     pub fn tangled(&self) -> bool {
         self.watch.tangled()
+    }
+
+    /// Lets layers that go through each other sink into the body by up to `depth` \[m\], and nothing else:
+    /// pressed against it they do not come apart.
+    pub fn let_tangled_sink(&mut self, depth: f64) {
+        for (sinks, v) in self.sinks.iter_mut().zip(&self.order) {
+            *sinks = if self.watch.is_tangled(*v) {
+                depth
+            } else {
+                0.0
+            };
+        }
     }
 
     /// Advances `state` by Δt under gravity and a `pressure` \[Pa\] from within.
@@ -230,7 +246,13 @@ impl<'a, S: Surface> Stepper<'a, S> {
     fn sweep(&mut self, apart: &mut Aparts, record: bool) {
         let (before, rows) = (&self.before, &mut self.rows);
         let reach = self.contact.thickness + 2.0 * self.params.speed * self.params.dt;
-        self.whole.look(self.surface, &self.contact, reach, before);
+        self.whole.look(Look {
+            surface: self.surface,
+            params: &self.contact,
+            reach,
+            rows: before,
+            sinks: &self.sinks,
+        });
         for sweep in 0..self.params.sweeps {
             let first = sweep == 0;
             self.whole.sweep(rows, Sweep { first, record });

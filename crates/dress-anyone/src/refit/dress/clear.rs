@@ -1,5 +1,5 @@
 //! Where a body leaves room for panels that wait around it: what is placed through the body waits farther
-//! out, and skirts that reach over the arms hang below them.
+//! out, skirts that reach over the arms hang below them, and tops are narrowed to pass between them.
 
 use crate::body::Body;
 use crate::garment::Garment;
@@ -49,8 +49,9 @@ pub(super) fn out_of(body: &Body, garment: &mut Garment) {
     }
 }
 
-/// What files call the part of the body that skirts and trousers go on.
+/// What files call the part of the body that skirts and trousers go on, and tops.
 const LEG: &str = "leg";
+const BODY: &str = "body";
 /// Distance of the levels at which arms are looked for, and the least gap between them and the trunk \[m\].
 const LEVEL: f64 = 0.02;
 const GAP: f64 = 0.04;
@@ -60,6 +61,8 @@ const ROOM: f64 = 0.03;
 const MIDDLE: f64 = 0.1;
 /// Parts of the angle from straight down that are tried, so many of them.
 const TRIES: usize = 20;
+/// The most by which narrowing fades from a level to the next: in 20 cm at most.
+const FADE: f64 = 0.1;
 
 /// A motion that lets skirts hang: about the middle of their waist, all is turned down by the same part of
 /// its angle.
@@ -70,13 +73,12 @@ pub(super) struct Hanging {
 }
 
 impl Hanging {
-    /// The least turn that keeps skirts from reaching over the arms of `body`.
-    pub(super) fn below_arms(body: &Body, garment: &Garment) -> Self {
-        let arms = Arms::of(body);
+    /// The least turn that keeps skirts from reaching over `arms`.
+    pub(super) fn below_arms(arms: &Arms, garment: &Garment) -> Self {
         let mesh = &garment.mesh;
         let panels = garment.pattern.panels.iter().zip(&mesh.panel_vertices);
         let points: Vec<Vec3> = panels
-            .filter(|(panel, _)| is_for_legs(panel))
+            .filter(|(panel, _)| is_for(LEG, panel))
             .flat_map(|(panel, vertices)| {
                 vertices
                     .clone()
@@ -105,7 +107,7 @@ impl Hanging {
 
     /// Where the point `p` of a panel starts \[m\].
     pub(super) fn start(&self, panel: &Panel, p: Vec3) -> Vec3 {
-        if self.part < 1.0 && is_for_legs(panel) {
+        if self.part < 1.0 && is_for(LEG, panel) {
             self.turned(p)
         } else {
             p
@@ -124,12 +126,80 @@ impl Hanging {
     }
 }
 
-fn is_for_legs(panel: &Panel) -> bool {
-    panel.label.as_deref() == Some(LEG)
+fn is_for(part: &str, panel: &Panel) -> bool {
+    panel.label.as_deref() == Some(part)
+}
+
+/// A motion that lets tops pass between arms: level by level, all is narrowed by the same part. Side seams
+/// that start beyond an arm would close around it, and hang on it.
+pub(super) struct Narrowing {
+    middle: f64,
+    floor: f64,
+    /// `[left of the middle, right of it][level]`; 1 keeps the width.
+    parts: [Vec<f64>; 2],
+}
+
+impl Narrowing {
+    /// The least that keeps tops from reaching into `arms`.
+    pub(super) fn between_arms(arms: &Arms, garment: &Garment) -> Self {
+        let (mesh, panels) = (&garment.mesh, &garment.pattern.panels);
+        let mut parts = [0, 1].map(|_| vec![1.0_f64; arms.inner.len()]);
+        for (panel, vertices) in panels.iter().zip(&mesh.panel_vertices) {
+            if !is_for(BODY, panel) {
+                continue;
+            }
+            for v in vertices.clone() {
+                let p = panel.placement.place(mesh.x_bar[v]);
+                let x = p.x - arms.middle;
+                if arms.are_within(p) {
+                    let level = arms.level(p.y);
+                    let part = (arms.inner[level] - ROOM) / x.abs();
+                    // It is taken between the middles of levels.
+                    for near in level.saturating_sub(1)..=level + 1 {
+                        if let Some(least) = parts[usize::from(x > 0.0)].get_mut(near) {
+                            *least = least.min(part);
+                        }
+                    }
+                }
+            }
+        }
+        for parts in &mut parts {
+            for level in 1..parts.len() {
+                parts[level] = parts[level].min(parts[level - 1] + FADE);
+            }
+            for level in (1..parts.len()).rev() {
+                parts[level - 1] = parts[level - 1].min(parts[level] + FADE);
+            }
+        }
+        Self {
+            middle: arms.middle,
+            floor: arms.floor,
+            parts,
+        }
+    }
+
+    /// Where the point `p` of a panel starts \[m\].
+    pub(super) fn start(&self, panel: &Panel, p: Vec3) -> Vec3 {
+        if !is_for(BODY, panel) {
+            return p;
+        }
+        let x = p.x - self.middle;
+        let parts = &self.parts[usize::from(x > 0.0)];
+        // A level's part holds in its middle.
+        let at = ((p.y - self.floor) / LEVEL - 0.5).clamp(0.0, parts.len() as f64 - 1.0);
+        let (below, between) = (at as usize, at.fract());
+        let above = (below + 1).min(parts.len() - 1);
+        let part = parts[below] + (parts[above] - parts[below]) * between;
+        if part < 1.0 {
+            Vec3::new(self.middle + x * part, p.y, p.z)
+        } else {
+            p
+        }
+    }
 }
 
 /// Where the arms of a body hang beside its trunk.
-struct Arms {
+pub(super) struct Arms {
     /// Between left and right \[m\].
     middle: f64,
     floor: f64,
@@ -138,7 +208,7 @@ struct Arms {
 }
 
 impl Arms {
-    fn of(body: &Body) -> Self {
+    pub(super) fn of(body: &Body) -> Self {
         let mesh = &body.mesh;
         let (low, high) = mesh.bounds();
         let middle = 0.5 * (low.x + high.x);
@@ -191,11 +261,15 @@ impl Arms {
 
     /// Whether an arm is nearer to the trunk than `p`, or hardly farther.
     fn are_within(&self, p: Vec3) -> bool {
-        let level = (p.y - self.floor) / LEVEL;
-        let inner = (level >= 0.0)
-            .then(|| self.inner.get(level as usize))
+        let inner = (p.y >= self.floor)
+            .then(|| self.inner.get(self.level(p.y)))
             .flatten();
         inner.is_some_and(|inner| (p.x - self.middle).abs() > inner - ROOM)
+    }
+
+    /// The level of a height at or above the floor.
+    fn level(&self, y: f64) -> usize {
+        ((y - self.floor) / LEVEL) as usize
     }
 }
 
@@ -235,16 +309,45 @@ mod tests {
         assert_eq!(after.xy(), before[0].placement.translation.xy());
     }
 
-    #[test]
-    fn a_skirt_over_the_arms_is_turned_down_below_them_and_what_is_not_for_legs_stays() {
-        // A trunk, and an arm 40 cm beside its middle that hangs to half its height.
+    /// A trunk, and an arm 40 cm beside its middle that hangs to half its height.
+    fn arms() -> Arms {
         let trunk = [[-0.15, -1.0, -0.1], [0.15, 1.0, 0.1]];
         let arm = |side: f64| {
             let x = [side * 0.4, side * 0.5];
             [[x[0].min(x[1]), 0.0, -0.05], [x[0].max(x[1]), 0.9, 0.05]]
         };
-        let body = body(&[trunk, arm(-1.0), arm(1.0)]);
-        let arms = Arms::of(&body);
+        Arms::of(&body(&[trunk, arm(-1.0), arm(1.0)]))
+    }
+
+    #[test]
+    fn a_top_passes_between_the_arms_and_what_is_not_for_the_body_stays() {
+        let arms = arms();
+        let mut garment = tube();
+        for p in &mut garment.mesh.x_bar {
+            p.x = 4.0 * (p.x - 0.16);
+        }
+        let beyond = |garment: &Garment| {
+            let narrowing = Narrowing::between_arms(&arms, garment);
+            let (x, _) = garment.moved(|panel, p| narrowing.start(panel, p));
+            // Where it begins, arms are 40 cm from the middle.
+            let over = |p: &&Vec3| p.y > 0.1 && p.x.abs() > 0.4;
+            x.iter().filter(over).count()
+        };
+        let without = beyond(&garment);
+        for panel in &mut garment.pattern.panels {
+            panel.label = Some(BODY.to_owned());
+        }
+        let with = beyond(&garment);
+        assert!(without > 0 && with == 0, "{without} {with}");
+        // Above the arms it keeps its width.
+        let narrowing = Narrowing::between_arms(&arms, &garment);
+        let above = Vec3::new(0.6, 1.2, 0.0);
+        assert_eq!(narrowing.start(&garment.pattern.panels[0], above), above);
+    }
+
+    #[test]
+    fn a_skirt_over_the_arms_is_turned_down_below_them_and_what_is_not_for_legs_stays() {
+        let arms = arms();
         let beside = |x: f64, y: f64| arms.are_within(Vec3::new(x, y, 0.0));
         assert!(beside(0.45, 0.5) && beside(-0.45, 0.5));
         assert!(!beside(0.3, 0.5) && !beside(0.45, -0.5));
@@ -254,7 +357,7 @@ mod tests {
             panel.label = Some(LEG.to_owned());
         }
         let reach = |garment: &Garment| {
-            let hanging = Hanging::below_arms(&body, garment);
+            let hanging = Hanging::below_arms(&arms, garment);
             let (x, _) = garment.moved(|panel, p| hanging.start(panel, p));
             (
                 hanging.part,

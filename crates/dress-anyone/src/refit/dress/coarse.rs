@@ -3,9 +3,9 @@
 //!
 //! Closing seams and falling takes as many steps in any mesh, and a coarse one does them for a small
 //! part of the price. What it ends with needs to be near a state of rest only; the fine mesh's own
-//! static solve decides. Where the coarse cloth does not come to rest, or the carried one goes
-//! through itself, the fine mesh starts from its panels after all. What slides off in a coarse mesh would
-//! in the fine one.
+//! static solve decides. Where only the carried cloth goes through itself, steps untangle it first. Where the
+//! coarse one does, or does not come to rest, the fine mesh starts from its panels after all. What slides off
+//! in a coarse mesh would in the fine one.
 
 use super::Dressing;
 use super::placed::placed;
@@ -69,9 +69,16 @@ pub(super) fn from_panels(
             drape.status = RestStatus::Sliding;
             return drape;
         }
-        let apart = || intersections::within(&carried, &garment.mesh.cloth_triangles()).is_empty();
-        if found.status == RestStatus::AtRest && apart() {
-            let mut drape = on.drape(garment, &placed, carried, Start::Near, sim, &mut observe);
+        let apart = |x: &[Vec3], garment: &Garment| {
+            intersections::within(x, &garment.mesh.cloth_triangles()).is_empty()
+        };
+        if found.status == RestStatus::AtRest && apart(&found.x, &coarse) {
+            let start = if apart(&carried, garment) {
+                Start::Near
+            } else {
+                Start::Tangled
+            };
+            let mut drape = on.drape(garment, &placed, carried, start, sim, &mut observe);
             drape.iterations += found.iterations;
             return drape;
         }

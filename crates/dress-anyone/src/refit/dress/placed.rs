@@ -1,9 +1,10 @@
 //! Where the panels of a garment start around a body, and how short.
 
-use super::clear::{Hanging, out_of};
+use super::clear::{Arms, Hanging, Narrowing, out_of};
 use crate::body::Body;
 use crate::garment::Garment;
 use crate::geometry::{Vec2, Vec3};
+use crate::pattern::Panel;
 
 /// A garment whose middle is below this part of the body's height is placed about the pelvis: the
 /// body it was drawn on has its origin there, not on the floor.
@@ -37,7 +38,7 @@ fn heights(garment: &Garment) -> (f64, f64) {
 }
 
 /// The panels placed on `body` \[m\], and the rest shape to begin with: what would start in the body waits in
-/// front of it, skirts hang below the arms, and what would start about the feet or below the soles, where it
+/// front of it, skirts hang below the arms, tops pass between them, and what would start about the feet or below the soles, where it
 /// would be caught, is shortened into the space between instep and knee.
 pub(super) fn placed(garment: &Garment, body: &Body) -> (Vec<Vec3>, Vec<Vec2>) {
     let mut garment = garment.clone();
@@ -46,11 +47,14 @@ pub(super) fn placed(garment: &Garment, body: &Body) -> (Vec<Vec3>, Vec<Vec2>) {
         panel.placement.translation.y += up;
     }
     out_of(body, &mut garment);
-    let hanging = Hanging::below_arms(body, &garment);
+    let arms = Arms::of(body);
+    let hanging = Hanging::below_arms(&arms, &garment);
+    let narrowing = Narrowing::between_arms(&arms, &garment);
+    let start = |panel: &Panel, p| narrowing.start(panel, hanging.start(panel, p));
     let (floor, top) = body.mesh.bounds();
     let at = |part: f64| floor.y + part * (top.y - floor.y);
     let (instep, knee) = (at(INSTEP), at(KNEE));
-    let (hung, _) = garment.moved(|panel, p| hanging.start(panel, p));
+    let (hung, _) = garment.moved(start);
     let lowest = hung.iter().map(|p| p.y).fold(f64::INFINITY, f64::min);
     let shorter = if lowest < instep {
         (knee - instep) / (knee - lowest)
@@ -58,7 +62,7 @@ pub(super) fn placed(garment: &Garment, body: &Body) -> (Vec<Vec3>, Vec<Vec2>) {
         1.0
     };
     garment.moved(|panel, p| {
-        let p = hanging.start(panel, p);
+        let p = start(panel, p);
         let y = if p.y < knee && shorter < 1.0 {
             knee - shorter * (knee - p.y)
         } else {

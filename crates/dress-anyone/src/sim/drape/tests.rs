@@ -3,7 +3,7 @@ use crate::check::{assert_derivative, noise};
 use crate::garment::Fabric;
 use crate::sim::cloth::Hold;
 use crate::sim::cloth::fixtures::{self, SOFT};
-use crate::sim::energy::contact::fixtures::Cone;
+use crate::sim::energy::contact::fixtures::{Cone, Floor};
 use approx::assert_relative_eq;
 
 /// A tube of circumference 0.6 m meets 0.6 m and more on it: held by the slope alone.
@@ -295,3 +295,57 @@ fn the_gradient_of_a_tube_with_friction_agrees_with_two_drapes() {
 
 mod gradients;
 mod theory;
+
+#[test]
+fn only_layers_that_go_through_each_other_may_sink_into_the_body() {
+    // A sheet on a floor, and another that goes through it upright.
+    let one = fixtures::sheet(6, 6, 0.02);
+    let count = one.x_bar.len() as u32;
+    let mut mesh = one.clone();
+    mesh.x_bar
+        .extend(one.x_bar.iter().map(|p| p.add_scalar(1.0)));
+    mesh.triangles
+        .extend(one.triangles.iter().map(|t| t.map(|v| v + count)));
+    mesh.sewing = (0..2 * count).collect();
+    mesh.cloth_vertex_count = 2 * count as usize;
+    let contact = ContactParams::default();
+    let height = contact.thickness;
+    let flat = one.x_bar.iter().map(|p| Vec3::new(p.x, height, p.y));
+    let upright = one.x_bar.iter().map(|p| {
+        // Its lower rim reaches a millimetre through.
+        Vec3::new(0.051, height - 1e-3 + p.y, p.x + 3e-3)
+    });
+    let x: Vec<Vec3> = flat.chain(upright).collect();
+    let cloth = Cloth::new(&mesh, &Fabric::default());
+    let rest = cloth.at_rest(&mesh.x_bar);
+    let lowest = |sinks: f64| {
+        let watch = Watch::new(&cloth, LayerParams::default(), &x);
+        assert!(watch.tangled());
+        let floor = Floor { height: 0.0 };
+        let params = StepParams::default();
+        let mut stepper = Stepper::new(&cloth, &rest, &floor, contact, params, watch);
+        let v = vec![Vec3::zeros(); x.len()];
+        let mut state = State { x: x.clone(), v };
+        let mut lowest = [height; 2];
+        for _ in 0..9 {
+            stepper.let_tangled_sink(sinks);
+            stepper.step(&mut state, 0.0);
+            for (v, p) in state.x.iter().enumerate() {
+                // The corner of the flat sheet is far from where they cross.
+                let at = usize::from(v != 0);
+                lowest[at] = lowest[at].min(p.y);
+            }
+        }
+        lowest
+    };
+    let sinks = 5e-3;
+    let [corner, deepest] = lowest(sinks);
+    // Contact gives way by a thousandth of the thickness under the weight.
+    assert!(corner > 0.99 * height, "{corner}");
+    let least = height - sinks;
+    assert!(
+        deepest < 0.5 * height && deepest > least - 1e-4,
+        "{deepest}"
+    );
+    assert!(lowest(0.0)[1] > 0.5 * height);
+}

@@ -22,6 +22,9 @@ pub struct Watch {
     room: f64,
     /// The farthest `room` that is ever given \[m\].
     most: f64,
+    /// How far the last step would have moved any vertex, against the mean \[m\]: seams that close pull from
+    /// rest farther than speeds tell.
+    wanted: f64,
     /// Steps until tangles are looked for again.
     countdown: usize,
 }
@@ -47,6 +50,7 @@ impl Watch {
             pairs: Vec::new(),
             from: Vec::new(),
             room: 0.0,
+            wanted: f64::INFINITY,
             countdown: LOOK,
         }
     }
@@ -54,6 +58,11 @@ impl Watch {
     /// Whether layers went through each other when last looked at.
     pub fn tangled(&self) -> bool {
         self.layers.tangled()
+    }
+
+    /// Whether a vertex was among them, or beside.
+    pub(in crate::sim) fn is_tangled(&self, v: u32) -> bool {
+        self.layers.tangled[v as usize]
     }
 
     /// Constraints for a step from `x` that wants to move by `wish` \[m\].
@@ -72,7 +81,7 @@ impl Watch {
             self.countdown = LOOK;
             self.layers.find_tangles(x);
         }
-        let farthest = farthest(&without_mean(wish));
+        let farthest = farthest(&without_mean(wish)).max(self.wanted);
         if look || self.from.len() != x.len() || self.left(x) < farthest.min(0.25 * self.most) {
             self.room = (STEPS_OF_ROOM * farthest).min(self.most);
             let still = vec![Vec3::zeros(); x.len()];
@@ -119,7 +128,7 @@ impl Watch {
     }
 
     /// Shortens the step from `before` to `x` so that no layer passes another.
-    pub(in crate::sim) fn restrain(&self, before: &[Vec3], x: &mut [Vec3]) {
+    pub(in crate::sim) fn restrain(&mut self, before: &[Vec3], x: &mut [Vec3]) {
         if !self.layers.params.on {
             return;
         }
@@ -127,6 +136,7 @@ impl Watch {
         let moves: Vec<Vec3> = x.iter().zip(before).map(|(x, b)| x - b).collect();
         let mut moves_of_own = without_mean(&moves);
         let mean = moves[0] - moves_of_own[0];
+        self.wanted = farthest(&moves_of_own);
         for d in &mut moves_of_own {
             let length = d.norm();
             if length > left {

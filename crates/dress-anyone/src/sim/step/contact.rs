@@ -27,6 +27,39 @@ pub(super) struct Contacts {
     inner: Points<3>,
 }
 
+/// What a step looks at to find contact.
+pub(super) struct Look<'a, S> {
+    pub(super) surface: &'a S,
+    pub(super) params: &'a ContactParams,
+    /// Distance from the body up to which points are looked at \[m\].
+    pub(super) reach: f64,
+    /// Positions before the step, `[place]`.
+    pub(super) rows: &'a [Four],
+    /// How far each vertex may sink in beyond the thickness \[m\], `[place]`.
+    pub(super) sinks: &'a [f64],
+}
+
+impl<S> Clone for Look<'_, S> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<S> Copy for Look<'_, S> {}
+
+impl<S> Look<'_, S> {
+    /// The same for the first `len` places, and for the others.
+    pub(super) fn split_at(self, len: usize) -> [Self; 2] {
+        let ((low, high), (low_sinks, high_sinks)) =
+            (self.rows.split_at(len), self.sinks.split_at(len));
+        [(low, low_sinks), (high, high_sinks)].map(|(rows, sinks)| Self {
+            rows,
+            sinks,
+            ..self
+        })
+    }
+}
+
 /// Contact points of `N` corners each.
 #[derive(Default)]
 pub(super) struct Points<const N: usize> {
@@ -102,19 +135,12 @@ impl Contacts {
         }
     }
 
-    /// Takes the planes of all points at `rows`, the positions before the step, that are closer than
-    /// `reach` \[m\] to the body: a point outside thin parts (toes, fingers) then stays on its side of
-    /// them. Forgets what was recorded.
-    pub(super) fn look(
-        &mut self,
-        surface: &impl Surface,
-        params: &ContactParams,
-        reach: f64,
-        rows: &[Four],
-    ) {
-        self.vertices.look(surface, params, reach, rows);
-        self.sides.look(surface, params, reach, rows);
-        self.inner.look(surface, params, reach, rows);
+    /// Takes the planes of all points that are close enough to the body: a point outside thin parts (toes,
+    /// fingers) then stays on its side of them. Forgets what was recorded.
+    pub(super) fn look(&mut self, look: Look<'_, impl Surface>) {
+        self.vertices.look(look);
+        self.sides.look(look);
+        self.inner.look(look);
     }
 
     /// Visits every point that is near once.
@@ -202,24 +228,27 @@ impl<const N: usize> Points<N> {
         }
     }
 
-    fn look(&mut self, surface: &impl Surface, params: &ContactParams, reach: f64, rows: &[Four]) {
+    fn look(&mut self, look: Look<'_, impl Surface>) {
         self.near.clear();
         self.tape.clear();
         for (i, (block, points)) in self.blocks.iter_mut().zip(&self.elements).enumerate() {
             let mut planes = [None; LANES];
             for (l, _) in points.each() {
-                let p = block.point(l, rows);
-                let found = surface.distance_below(p, reach);
+                let p = block.point(l, look.rows);
+                let found = look.surface.distance_below(p, look.reach);
+                let shares = block.corners_of(l).into_iter();
+                let sinks: f64 = shares.map(|(a, share)| look.sinks[a] * share).sum();
+                let least = look.params.thickness - sinks;
                 planes[l] = found.and_then(|(d, gradient)| {
                     let (normal, raised) = slope(gradient)?;
-                    Some((normal, raised, normal.dot(&p) - (d - params.thickness)))
+                    Some((normal, raised, normal.dot(&p) - (d - least)))
                 });
             }
             if planes.iter().any(Option::is_some) {
                 for (l, plane) in planes.into_iter().enumerate() {
                     // What is nowhere near, and lanes left over, never push: c = 1.
                     let nowhere = (Vec3::zeros(), 1.0, -1.0);
-                    block.set(l, plane.unwrap_or(nowhere), rows);
+                    block.set(l, plane.unwrap_or(nowhere), look.rows);
                 }
                 self.near.push(i);
             }

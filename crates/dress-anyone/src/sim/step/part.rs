@@ -9,7 +9,7 @@
 //! A part is halved where its vertices, in the order in which a walk from one end of it comes to them,
 //! are halved. Of 10,000 vertices some 7 % of the constraints lie across.
 
-use super::contact::Contacts;
+use super::contact::{Contacts, Look};
 use super::crease::Creases;
 use super::hold::Holds;
 use super::lanes::Four;
@@ -141,25 +141,16 @@ impl Part {
     }
 
     /// Looks for contacts of the positions before the step, and forgets what was recorded.
-    pub(super) fn look<S: Surface>(
-        &mut self,
-        surface: &S,
-        contact: &ContactParams,
-        reach: f64,
-        before: &[Four],
-    ) {
+    pub(super) fn look(&mut self, look: Look<'_, impl Surface>) {
         if let Some([low, high]) = self.halves.as_deref_mut() {
-            let (b_low, b_high) = before.split_at(low.len);
-            join(
-                || low.look(surface, contact, reach, b_low),
-                || high.look(surface, contact, reach, b_high),
-            );
+            let [first, second] = look.split_at(low.len);
+            join(|| low.look(first), || high.look(second));
         }
         self.stretch.taped.clear();
         self.turn.taped.clear();
         self.creases.clear();
         self.holds.clear();
-        self.contacts.look(surface, contact, reach, before);
+        self.contacts.look(look);
     }
 
     /// Visits membrane, bending, folds and holds.

@@ -2,7 +2,6 @@
 
 use super::*;
 use crate::sim::energy::contact::Nothing;
-use crate::sim::energy::contact::fixtures::Floor;
 
 #[test]
 fn a_tight_tube_presses_as_laplace_says() {
