@@ -2,7 +2,7 @@
 //! closest points, and no vertex reaches that plane (cf. Chen et al. 2025, Offset Geometric Contact, whose
 //! bounds are balls instead).
 
-use super::first_side;
+use super::{first_side, without_mean};
 use crate::geometry::Vec3;
 use crate::sim::energy::layers::{Kind, Pair};
 
@@ -11,13 +11,27 @@ const SHARE: f64 = 0.9;
 /// Passes in which the parting planes may move along with the cloth.
 const MOVING_PASSES: usize = 3;
 
-/// Shortens the move `d` from `x` of single vertices, so that no layer passes through another.
+/// Shortens the move `d` from `x` of single vertices, so that no layer passes through another: what it has
+/// beyond the mean of all, for only by that do pieces come closer.
 /// `pairs` are all that the move could bring together; none comes closer than the part `least` of the distance
 /// at which it begins to feel the other. Whether anything was shortened.
 ///
 /// The parting planes move along with the mean of their pair, so that layers fall together. Where
 /// that does not work out, because a vertex is held back elsewhere, planes stand still in the end.
 pub fn hold_apart(pairs: &[Pair], x: &[Vec3], d: &mut [Vec3], least: f64) -> bool {
+    let mean = d.iter().sum::<Vec3>() / d.len() as f64;
+    let mut own = without_mean(d);
+    let shortened = hold_own_moves_apart(pairs, x, &mut own, least);
+    if shortened {
+        for (d, own) in d.iter_mut().zip(own) {
+            *d = mean + own;
+        }
+    }
+    shortened
+}
+
+/// The same for moves `d` less the mean of all.
+fn hold_own_moves_apart(pairs: &[Pair], x: &[Vec3], d: &mut [Vec3], least: f64) -> bool {
     let planes: Vec<Plane> = (pairs.iter())
         .filter_map(|pair| Plane::between(pair, x, d, least))
         .collect();

@@ -5,6 +5,7 @@
 //! left, and what it could meet on the way is held apart, so layers that start apart stay apart.
 //! All moves are counted against the mean of all: what falls as one piece uses up no room.
 
+use super::untangle::Piercing;
 use super::{Layers, hold_apart, without_mean};
 use crate::geometry::Vec3;
 use crate::sim::cloth::Cloth;
@@ -27,6 +28,8 @@ pub struct Watch {
     wanted: f64,
     /// Steps until tangles are looked for again.
     countdown: usize,
+    /// Edges that went through triangles before the last step.
+    piercings: usize,
 }
 
 /// Room as part of the mean move of a step, so that pairs last for a few steps.
@@ -52,6 +55,7 @@ impl Watch {
             room: 0.0,
             wanted: f64::INFINITY,
             countdown: LOOK,
+            piercings: 0,
         }
     }
 
@@ -75,12 +79,16 @@ impl Watch {
         if !self.layers.params.on {
             return Vec::new();
         }
+        let mut untangling = self.untangling(x);
         self.countdown -= 1;
-        let look = self.countdown == 0;
+        // What has just come apart must not go through itself again.
+        let look = self.countdown == 0 || untangling.len() < self.piercings;
         if look {
             self.countdown = LOOK;
             self.layers.find_tangles(x);
+            untangling = self.untangling(x);
         }
+        self.piercings = untangling.len();
         let farthest = farthest(&without_mean(wish)).max(self.wanted);
         if look || self.from.len() != x.len() || self.left(x) < farthest.min(0.25 * self.most) {
             self.room = (STEPS_OF_ROOM * farthest).min(self.most);
@@ -103,16 +111,17 @@ impl Watch {
             })
         };
         let mut all: Vec<Apart> = self.pairs.iter().filter_map(apart).collect();
-        if self.layers.tangled() {
-            all.extend(self.untangling(x));
-        }
+        all.extend(untangling);
         all
     }
 
     /// Constraints that pull layers back which go through each other at `x`.
-    fn untangling(&self, x: &[Vec3]) -> impl Iterator<Item = Apart> {
+    fn untangling(&self, x: &[Vec3]) -> Vec<Apart> {
+        if !self.layers.tangled() {
+            return Vec::new();
+        }
         let push = PUSH * self.layers.thickness();
-        self.layers.piercings(x).into_iter().filter_map(move |p| {
+        let constraint = |p: Piercing| {
             let direction = p.push.try_normalize(1e-6)?;
             let gradient = p.weights.map(|w| direction * w);
             let now: f64 = (0..5)
@@ -124,7 +133,10 @@ impl Watch {
                 gap: now + push * p.push.norm(),
                 alpha_tilde: 0.0,
             })
-        })
+        };
+        (self.layers.piercings(x).into_iter())
+            .filter_map(constraint)
+            .collect()
     }
 
     /// Shortens the step from `before` to `x` so that no layer passes another.

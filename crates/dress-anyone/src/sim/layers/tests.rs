@@ -128,12 +128,12 @@ fn no_move_takes_one_layer_through_another() {
         let mut layers = Layers::new(&cloth, PARAMS, &x);
         let count = x.len() / 2;
         for step in 0..10 {
-            // The upper sheet falls by more than the gap; all is shaken and drifts aside.
+            // The upper sheet falls by more than the gap; all is shaken and drifts, aside and upwards.
             let mut d: Vec<Vec3> = (0..x.len())
                 .map(|i| {
                     let shake = Vec3::from_fn(|c, _| 3e-3 * noise(seed * 91 + 7 * i + c + step));
                     let fall = if i < count { 0.0 } else { -4e-3 };
-                    shake + Vec3::new(0.02, fall, 0.0)
+                    shake + Vec3::new(0.02, fall + 0.03, 0.0)
                 })
                 .collect();
             let pairs = layers.pairs(&x, &d, 0.0);
@@ -203,4 +203,17 @@ fn what_goes_through_itself_is_exempt_and_the_rest_is_not() {
     for pair in pairs {
         assert!(!pair.vertices.contains(&(count as u32)), "{pair:?}");
     }
+}
+
+#[test]
+fn what_has_come_apart_is_held_apart_at_once() {
+    let (cloth, apart) = two_sheets(3e-3);
+    let mut through = apart.clone();
+    through[apart.len() / 2].y -= 0.02;
+    let mut watch = Watch::new(&cloth, PARAMS, &through);
+    let still = vec![Vec3::zeros(); apart.len()];
+    watch.constraints(&through, &still, 1.0);
+    assert!(watch.tangled());
+    watch.constraints(&apart, &still, 1.0);
+    assert!(!watch.tangled());
 }
