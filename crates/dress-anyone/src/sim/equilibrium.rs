@@ -148,8 +148,10 @@ const LEAST_GROWTH: f64 = 0.05;
 /// Newton steps that move no vertex farther than this are round-off of positions of a metre or two \[m\]:
 /// in fine cloth they end before the residual is as low as asked for.
 const ROUND_OFF: f64 = 1e-14;
-/// Residual below which energy differences drown in round-off, and the residual itself must fall.
+/// Residual below which energy differences may drown in round-off, and it is enough that the residual falls.
 const ROUND_OFF_BELOW: f64 = 1e-4;
+/// What energies, sums of some 10⁵ terms, may be off by, as a part of them \[–\].
+const ROUND_OFF_OF_ENERGY: f64 = 1e-13;
 /// Least part of a step after which a patch may settle: shorter ones fail for another reason.
 const LEAST_PATCHED: f64 = 0.25;
 /// Forces that a patch settles to, as part of those before the step; a step that leaves less needs none.
@@ -386,8 +388,9 @@ fn line_search<S: Surface>(
                 return Some((settled, fraction));
             }
         }
+        let clearly_lower = energy < from.energy - ROUND_OFF_OF_ENERGY * from.energy.abs();
         let better = if drowned {
-            step.residual < from.residual
+            clearly_lower || step.residual < from.residual
         } else {
             lower
         };
