@@ -38,8 +38,8 @@ fn heights(garment: &Garment) -> (f64, f64) {
 }
 
 /// The panels placed on `body` \[m\], and the rest shape to begin with: what would start in the body waits in
-/// front of it, skirts hang below the arms, tops pass between them, and what would start about the feet or below the soles, where it
-/// would be caught, is shortened into the space between instep and knee.
+/// front of it, skirts hang below the arms, tops pass between them, and what would start about the feet or
+/// below the soles, where it would be caught, is shortened into the space between instep and knee.
 pub(super) fn placed(garment: &Garment, body: &Body) -> (Vec<Vec3>, Vec<Vec2>) {
     let mut garment = garment.clone();
     let up = lift(&garment, body);

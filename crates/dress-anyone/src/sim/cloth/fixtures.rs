@@ -39,6 +39,19 @@ pub(crate) fn patched(mesh: &PatternMesh) -> Cloth {
     cloth
 }
 
+/// One cloth of a mesh without seams and its copy.
+pub(crate) fn twice(one: &PatternMesh) -> PatternMesh {
+    let count = one.x_bar.len() as u32;
+    let mut both = one.clone();
+    both.x_bar
+        .extend(one.x_bar.iter().map(|p| p.add_scalar(1.0)));
+    both.triangles
+        .extend(one.triangles.iter().map(|t| t.map(|v| v + count)));
+    both.sewing = (0..2 * count).collect();
+    both.cloth_vertex_count = 2 * count as usize;
+    both
+}
+
 /// Has the contact points rub as the materials do.
 pub(crate) fn rub(cloth: &mut Cloth) {
     for point in &mut cloth.contacts {

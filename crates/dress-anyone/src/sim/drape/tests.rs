@@ -300,14 +300,7 @@ mod theory;
 fn only_layers_that_go_through_each_other_may_sink_into_the_body() {
     // A sheet on a floor, and another that goes through it upright.
     let one = fixtures::sheet(6, 6, 0.02);
-    let count = one.x_bar.len() as u32;
-    let mut mesh = one.clone();
-    mesh.x_bar
-        .extend(one.x_bar.iter().map(|p| p.add_scalar(1.0)));
-    mesh.triangles
-        .extend(one.triangles.iter().map(|t| t.map(|v| v + count)));
-    mesh.sewing = (0..2 * count).collect();
-    mesh.cloth_vertex_count = 2 * count as usize;
+    let mesh = fixtures::twice(&one);
     let contact = ContactParams::default();
     let height = contact.thickness;
     let flat = one.x_bar.iter().map(|p| Vec3::new(p.x, height, p.y));

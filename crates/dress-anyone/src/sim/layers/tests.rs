@@ -16,22 +16,15 @@ const PARAMS: LayerParams = LayerParams {
 /// Two sheets of one cloth, `gap` \[m\] above each other, crumpled a little.
 fn two_sheets(gap: f64) -> (Cloth, Vec<Vec3>) {
     let one = fixtures::sheet(6, 6, 0.02);
-    let count = one.x_bar.len() as u32;
-    let mut both = one.clone();
-    both.x_bar
-        .extend(one.x_bar.iter().map(|p| p.add_scalar(1.0)));
-    both.triangles
-        .extend(one.triangles.iter().map(|t| t.map(|v| v + count)));
-    both.sewing = (0..2 * count).collect();
-    both.cloth_vertex_count = 2 * count as usize;
-    let x = (0..2 * count as usize)
+    let count = one.x_bar.len();
+    let x = (0..2 * count)
         .map(|i| {
-            let p = one.x_bar[i % count as usize];
-            let up = if i < count as usize { 0.0 } else { gap };
+            let p = one.x_bar[i % count];
+            let up = if i < count { 0.0 } else { gap };
             Vec3::new(p.x, up, p.y) + Vec3::from_fn(|c, _| 1e-3 * noise(3 * i + c))
         })
         .collect();
-    (Cloth::new(&both, &Fabric::default()), x)
+    (Cloth::new(&fixtures::twice(&one), &Fabric::default()), x)
 }
 
 #[test]
