@@ -198,13 +198,7 @@ fn of_size(criterion: &mut Criterion<CpuTime>, size: usize) -> Vec<summary::Row>
         });
     });
 
-    let system = System {
-        cloth: &cloth,
-        rest: &rest,
-        surface: &surface,
-        contact: params.contact,
-        grips: &[],
-    };
+    let system = System::new(&cloth, &rest, &surface, params.contact, &[]);
     group.bench_function("stiffness", |b| {
         b.iter(|| system.stiffness(&assembly, &at_rest, &[], 1.0));
     });

@@ -84,15 +84,22 @@ impl DistanceField {
         })
     }
 
-    /// The same where the distance is below `limit` \[m\]; told from one node where that is far off.
-    pub fn sample_below(&self, p: Vec3, limit: f64) -> Option<Sample> {
+    /// The same where the distance is below `limit` \[m\]; elsewhere how far p may move at least before it
+    /// can be \[m\]. Told from one node where that is far off.
+    pub fn sample_below(&self, p: Vec3, limit: f64) -> Result<Sample, f64> {
         let u = (p - self.grid.origin) / self.grid.spacing;
         // What is no number, or below zero, becomes node 0, whose sample decides.
-        let place = self.place([0, 1, 2].map(|axis| (u[axis] + 0.5) as usize))?;
-        if self.values[place] - DROP * self.grid.spacing > limit {
-            return None;
+        let nearest = [0, 1, 2].map(|axis| (u[axis] + 0.5) as usize);
+        let place = self.place(nearest).ok_or(0.0)?;
+        let least = self.values[place] - DROP * self.grid.spacing;
+        if least > limit {
+            return Err((least - limit) / STEEPEST);
         }
-        self.sample(p).filter(|s| s.distance < limit)
+        match self.sample(p) {
+            Some(sample) if sample.distance < limit => Ok(sample),
+            Some(sample) => Err((sample.distance - limit) / STEEPEST),
+            None => Err(0.0),
+        }
     }
 
     /// Distance, gradient and Hessian \[1/m\] at `p`; none farther outside than the band.
@@ -285,6 +292,9 @@ const SHARPEST: f64 = 0.2;
 /// differ by no more than their places, p is √¾ from that node, and the spline's weights spread by
 /// another √(1/3) along each axis: √(¾ + 1); and twice what coefficients differ from distances.
 const DROP: f64 = 1.33 + 2.0 * SHARPEST;
+/// Most that the field rises or falls per way \[–\]: along each axis neighbouring coefficients differ by one
+/// spacing at most, and by what both differ from distances.
+const STEEPEST: f64 = 1.74 * (1.0 + 2.0 * SHARPEST);
 
 fn dot(weights: &[f64; 4], values: &[f64; 4]) -> f64 {
     let products: [f64; 4] = [

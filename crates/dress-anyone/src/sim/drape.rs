@@ -244,18 +244,13 @@ impl Drape {
     }
 }
 
-pub(super) fn system<'a, S>(
+pub(super) fn system<'a, S: Surface>(
     scene: &Scene<'a, S>,
     rest: &'a Rest,
     grips: &'a [Grip],
 ) -> System<'a, S> {
-    System {
-        cloth: scene.cloth,
-        rest,
-        surface: scene.surface,
-        contact: scene.params.contact,
-        grips,
-    }
+    let contact = scene.params.contact;
+    System::new(scene.cloth, rest, scene.surface, contact, grips)
 }
 
 /// Part of the gathering time over which the inflation fades \[–\].

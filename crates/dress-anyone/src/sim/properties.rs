@@ -88,13 +88,7 @@ fn crumpled() -> impl Strategy<Value = Crumpled> {
 }
 
 fn system<'a>(cloth: &'a Cloth, rest: &'a Rest) -> System<'a, Nothing> {
-    System {
-        cloth,
-        rest,
-        surface: &Nothing,
-        contact: ContactParams::default(),
-        grips: &[],
-    }
+    System::new(cloth, rest, &Nothing, ContactParams::default(), &[])
 }
 
 fn dot(a: &[Vec3], b: &[Vec3]) -> f64 {

@@ -5,12 +5,13 @@
 pub(crate) mod fixtures;
 
 use super::cloth::{Cloth, ContactPoint, GRAVITY, Hinge, Rest};
-use super::energy::contact::{self, ContactParams, Surface};
+use super::energy::contact::{Contact, ContactParams, Surface};
 use super::energy::friction::Grip;
 use super::energy::layers::Pair;
 use super::energy::membrane;
 use crate::geometry::sparse::{BlockMatrix, Slot, Structure};
 use crate::geometry::{Mat3, Vec3};
+use std::cell::RefCell;
 use std::sync::Arc;
 
 /// Where each element's blocks go in the stiffness matrix; the same for every x and x̄, but for
@@ -113,9 +114,63 @@ pub struct System<'a, S> {
     pub contact: ContactParams,
     /// Friction of each of the cloth's contact points; none at all without friction.
     pub grips: &'a [Grip],
+    /// What each contact point found last.
+    found: RefCell<Vec<Found>>,
 }
 
-impl<S: Surface> System<'_, S> {
+/// What a contact point found of the body.
+#[derive(Clone, Copy)]
+struct Found {
+    /// Where it was \[m\].
+    from: Vec3,
+    /// Distance and gradient; or how far it may move from there, and still not touch \[m\].
+    touch: Result<(f64, Vec3), f64>,
+}
+
+impl<'a, S: Surface> System<'a, S> {
+    /// `cloth` of a `rest` shape on a body.
+    pub fn new(
+        cloth: &'a Cloth,
+        rest: &'a Rest,
+        surface: &'a S,
+        contact: ContactParams,
+        grips: &'a [Grip],
+    ) -> Self {
+        let nothing = Found {
+            from: Vec3::repeat(f64::NAN),
+            touch: Err(0.0),
+        };
+        Self {
+            cloth,
+            rest,
+            surface,
+            contact,
+            grips,
+            found: RefCell::new(vec![nothing; cloth.contacts.len()]),
+        }
+    }
+
+    /// How contact point `i` touches the body; none where it does not. Energy, forces and stiffness at the same
+    /// x look at the body once, and points that are far off only when they have come nearer.
+    fn contact(&self, i: usize, x: &[Vec3]) -> Option<Contact> {
+        let (point, h) = (&self.cloth.contacts[i], self.contact.thickness);
+        let p = point.at(x);
+        let found = &mut self.found.borrow_mut()[i];
+        let knows = match found.touch {
+            Ok(_) => found.from == p,
+            Err(room) => (p - found.from).norm_squared() < room * room,
+        };
+        if !knows {
+            *found = Found {
+                from: p,
+                touch: self.surface.distance_below(p, h),
+            };
+        }
+        let (d, n) = found.touch.ok()?;
+        let kappa = self.kappa(point);
+        Some(Contact { kappa, h, p, d, n })
+    }
+
     /// U \[J\]. `pairs` are all layers that may touch.
     pub fn energy(&self, x: &[Vec3], pairs: &[Pair]) -> f64 {
         let mut sum = 0.0;
@@ -135,9 +190,8 @@ impl<S: Surface> System<'_, S> {
         for (a, p) in x.iter().enumerate() {
             sum -= self.rest.mass[a] * GRAVITY.dot(p);
         }
-        for point in &self.cloth.contacts {
-            let h = self.contact.thickness;
-            sum += contact::energy(self.surface, self.kappa(point), h, point.at(x));
+        for i in 0..self.cloth.contacts.len() {
+            sum += self.contact(i, x).map_or(0.0, |contact| contact.energy());
         }
         for (grip, point) in self.grips.iter().zip(&self.cloth.contacts) {
             sum += grip.energy(self.kappa(point), point.at(x));
@@ -182,11 +236,12 @@ impl<S: Surface> System<'_, S> {
                 f[*a as usize] += force;
             }
         }
-        for point in &self.cloth.contacts {
-            let h = self.contact.thickness;
-            let force = contact::force(self.surface, self.kappa(point), h, point.at(x));
-            for (a, weight) in point.parts() {
-                f[a] += weight * force;
+        for (i, point) in self.cloth.contacts.iter().enumerate() {
+            if let Some(contact) = self.contact(i, x) {
+                let force = contact.force();
+                for (a, weight) in point.parts() {
+                    f[a] += weight * force;
+                }
             }
         }
         for (grip, point) in self.grips.iter().zip(&self.cloth.contacts) {
@@ -267,10 +322,10 @@ impl<S: Surface> System<'_, S> {
         for (i, point) in self.cloth.contacts.iter().enumerate() {
             let own;
             (own, slots) = slots.split_at(pairs_of(point).count());
-            let (kappa, h) = (self.kappa(point), self.contact.thickness);
-            let p = point.at(x);
-            let pressing = contact::stiffness(self.surface, kappa, h, p, exactness);
-            let gripping = self.grips.get(i).and_then(|grip| grip.stiffness(kappa, p));
+            let contact = self.contact(i, x);
+            let pressing = contact.map(|contact| contact.stiffness(self.surface, exactness));
+            let grip = |grip: &Grip| grip.stiffness(self.kappa(point), point.at(x));
+            let gripping = self.grips.get(i).and_then(grip);
             let Some(block) = pressing.into_iter().chain(gripping).reduce(|a, b| a + b) else {
                 continue;
             };

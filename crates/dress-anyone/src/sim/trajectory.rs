@@ -166,13 +166,8 @@ impl<'a, S: Surface> Trajectory<'a, S> {
 
     /// ‖f‖/(‖m‖|g|) at the end: how far from rest it still is.
     pub fn residual(&self) -> f64 {
-        let system = System {
-            cloth: self.cloth,
-            rest: &self.rest,
-            surface: self.surface,
-            contact: self.params.contact,
-            grips: &[],
-        };
+        let contact = self.params.contact;
+        let system = System::new(self.cloth, &self.rest, self.surface, contact, &[]);
         system.residual(&system.force(&self.last.x, &[]))
     }
 

@@ -209,14 +209,19 @@ fn a_sample_below_a_limit_is_the_sample_wherever_it_is_below_it() {
         for limit in [-0.01, 0.0, 3e-3, 0.02] {
             let sample = field.sample(p);
             let below = sample.filter(|s| s.distance < limit);
-            assert_eq!(field.sample_below(p, limit), below);
+            let found = field.sample_below(p, limit);
+            assert_eq!(found.ok(), below);
+            // As far as it tells, nothing is below the limit.
+            let way = direction(i + 7) * (0.999 * found.err().unwrap_or(0.0));
+            let there = field.sample(p + way).filter(|s| s.distance < limit);
+            assert!(below.is_some() || there.is_none(), "{p} {way}");
             assert_eq!(field.sample_with_hessian(p).map(|(s, _)| s), sample);
             counts[usize::from(below.is_some())] += 1;
         }
     }
     assert!(counts.iter().all(|n| *n > 1000), "{counts:?}");
-    assert_eq!(field.sample_below(Vec3::repeat(f64::NAN), 1.0), None);
-    assert_eq!(field.sample_below(Vec3::repeat(9.0), 1.0), None);
+    assert_eq!(field.sample_below(Vec3::repeat(f64::NAN), 1.0), Err(0.0));
+    assert_eq!(field.sample_below(Vec3::repeat(9.0), 1.0), Err(0.0));
 }
 
 #[test]

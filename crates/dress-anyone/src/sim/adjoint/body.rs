@@ -7,7 +7,7 @@
 
 use crate::body::DistanceField;
 use crate::geometry::{TriangleMesh, Vec3};
-use crate::sim::energy::contact;
+use crate::sim::energy::contact::Contact;
 use crate::sim::system::System;
 
 /// Gradient by the vertices of `body`, the mesh of the system's field, at positions `x`.
@@ -28,8 +28,8 @@ pub fn body_pull_back(
             }
         }
         let h = contact.thickness;
-        let (by_distance, by_gradient) =
-            contact::distance_pull_back(system.surface, kappa, h, p, push_hat)?;
+        let touching = Contact::at(system.surface, kappa, h, p)?;
+        let (by_distance, by_gradient) = touching.distance_pull_back(push_hat);
         Some((p, by_distance, by_gradient))
     };
     let points = system.cloth.contacts.iter().enumerate();

@@ -14,10 +14,10 @@ use serde::{Deserialize, Serialize};
 pub trait Surface: Sync {
     /// Signed distance \[m\] (positive outside) and its gradient; none where nothing is near.
     fn distance(&self, p: Vec3) -> Option<(f64, Vec3)>;
-    /// The same where the distance is below `limit` \[m\], and none elsewhere: most points of a
-    /// cloth are far from the body, which may be cheap to tell.
-    fn distance_below(&self, p: Vec3, limit: f64) -> Option<(f64, Vec3)> {
-        self.distance(p).filter(|(d, _)| *d < limit)
+    /// The same where the distance is below `limit` \[m\]; elsewhere how far p may move at least before it
+    /// can be \[m\]: most points of a cloth are far from the body, which may be cheap to tell.
+    fn distance_below(&self, p: Vec3, limit: f64) -> Result<(f64, Vec3), f64> {
+        self.distance(p).filter(|(d, _)| *d < limit).ok_or(0.0)
     }
     /// Hessian of the distance \[1/m\]; zero where nothing is near.
     fn curvature(&self, p: Vec3) -> Mat3;
@@ -28,7 +28,7 @@ impl Surface for DistanceField {
         self.sample(p).map(|s| (s.distance, s.gradient))
     }
 
-    fn distance_below(&self, p: Vec3, limit: f64) -> Option<(f64, Vec3)> {
+    fn distance_below(&self, p: Vec3, limit: f64) -> Result<(f64, Vec3), f64> {
         self.sample_below(p, limit)
             .map(|s| (s.distance, s.gradient))
     }
@@ -101,52 +101,57 @@ fn response(d: f64, h: f64) -> [f64; 3] {
     ]
 }
 
-/// Energy of one point of contact stiffness `kappa` \[N/m\] at p, with offset h \[m\].
-pub fn energy(surface: &impl Surface, kappa: f64, h: f64, p: Vec3) -> f64 {
-    match surface.distance_below(p, h) {
-        Some((d, _)) => kappa * response(d, h)[0],
-        _ => 0.0,
-    }
+/// A point p that the body touches.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Contact {
+    /// Contact stiffness κ \[N/m\].
+    pub kappa: f64,
+    /// Distance at which it begins to feel the body \[m\].
+    pub h: f64,
+    /// Where it is \[m\].
+    pub p: Vec3,
+    /// Signed distance \[m\], less than h.
+    pub d: f64,
+    /// Its gradient \[–\].
+    pub n: Vec3,
 }
 
-/// −∂U/∂p \[N\].
-pub fn force(surface: &impl Surface, kappa: f64, h: f64, p: Vec3) -> Vec3 {
-    match surface.distance_below(p, h) {
-        Some((d, n)) => n * (kappa * response(d, h)[1]),
-        _ => Vec3::zeros(),
+impl Contact {
+    /// A point of stiffness `kappa` at `p`; none where the body is farther than `h`.
+    pub fn at(surface: &impl Surface, kappa: f64, h: f64, p: Vec3) -> Option<Self> {
+        let (d, n) = surface.distance_below(p, h).ok()?;
+        Some(Self { kappa, h, p, d, n })
     }
-}
 
-/// ∂²U/∂p² \[N/m\]; none where there is no contact. With the part `curvature` of the curvature
-/// term: 1 is exact, 0 makes it positive semi-definite.
-pub fn stiffness(
-    surface: &impl Surface,
-    kappa: f64,
-    h: f64,
-    p: Vec3,
-    curvature: f64,
-) -> Option<Mat3> {
-    let (d, n) = surface.distance_below(p, h)?;
-    let [_, push, slope] = response(d, h);
-    let mut k = n * n.transpose() * slope;
-    if curvature > 0.0 {
-        k -= surface.curvature(p) * (curvature * push);
+    /// U \[J\].
+    pub fn energy(&self) -> f64 {
+        self.kappa * response(self.d, self.h)[0]
     }
-    Some(k * kappa)
-}
 
-/// Gradient of λ·push, where push is the [`force`], by the distance d and by its gradient ∇d at p;
-/// none where there is no contact.
-pub fn distance_pull_back(
-    surface: &impl Surface,
-    kappa: f64,
-    h: f64,
-    p: Vec3,
-    lambda: Vec3,
-) -> Option<(f64, Vec3)> {
-    let (d, n) = surface.distance_below(p, h)?;
-    let [_, push, slope] = response(d, h);
-    Some((-kappa * slope * n.dot(&lambda), lambda * (kappa * push)))
+    /// −∂U/∂p \[N\].
+    pub fn force(&self) -> Vec3 {
+        self.n * (self.kappa * response(self.d, self.h)[1])
+    }
+
+    /// ∂²U/∂p² \[N/m\], with the part `curvature` of the curvature term: 1 is exact, 0 makes it positive
+    /// semi-definite.
+    pub fn stiffness(&self, surface: &impl Surface, curvature: f64) -> Mat3 {
+        let [_, push, slope] = response(self.d, self.h);
+        let mut k = self.n * self.n.transpose() * slope;
+        if curvature > 0.0 {
+            k -= surface.curvature(self.p) * (curvature * push);
+        }
+        k * self.kappa
+    }
+
+    /// Gradient of λ·push, where push is the [`Self::force`], by the distance d and by its gradient.
+    pub fn distance_pull_back(&self, lambda: Vec3) -> (f64, Vec3) {
+        let [_, push, slope] = response(self.d, self.h);
+        (
+            -self.kappa * slope * self.n.dot(&lambda),
+            lambda * (self.kappa * push),
+        )
+    }
 }
 
 #[cfg(test)]
@@ -233,15 +238,13 @@ mod tests {
     use crate::check::assert_derivative;
 
     fn check(surface: &impl Surface, p: Vec3) {
-        let (kappa, h) = (3.0, 0.1);
+        let at = |p: Vec3| Contact::at(surface, 3.0, 0.1, p).expect("the point must touch");
         let d = Vec3::new(0.3, -0.5, 0.7);
         let q = Vec3::new(-0.2, 0.9, 0.4);
-        let u = |s: f64| energy(surface, kappa, h, p + d * s);
-        assert!(u(0.0) > 0.0, "the point must touch");
-        let slope = -force(surface, kappa, h, p).dot(&d);
-        assert_derivative(u, slope, 1e-5, 1e-3, 1e-7);
-        let k = stiffness(surface, kappa, h, p, 1.0).expect("touches");
-        let g = |s: f64| -force(surface, kappa, h, p + d * s).dot(&q);
+        let slope = -at(p).force().dot(&d);
+        assert_derivative(|s| at(p + d * s).energy(), slope, 1e-5, 1e-3, 1e-7);
+        let k = at(p).stiffness(surface, 1.0);
+        let g = |s: f64| -at(p + d * s).force().dot(&q);
         assert_derivative(g, q.dot(&(k * d)), 1e-5, 1e-3, 1e-7);
     }
 
@@ -266,7 +269,8 @@ mod tests {
         let params = ContactParams::default();
         let ball = Ball { radius: 1.0 };
         let p = Vec3::x() * (1.0 + 0.1 * params.thickness);
-        let pressure = force(&ball, params.stiffness, params.thickness, p).norm();
+        let contact = Contact::at(&ball, params.stiffness, params.thickness, p);
+        let pressure = contact.expect("touches").force().norm();
         assert!(pressure > 200e3, "{pressure}");
     }
 
@@ -274,8 +278,6 @@ mod tests {
     fn nothing_pushes_where_nothing_touches() {
         let ball = Ball { radius: 1.0 };
         let far = Vec3::new(2.0, 0.0, 0.0);
-        assert_eq!(energy(&ball, 1.0, 0.1, far), 0.0);
-        assert_eq!(force(&ball, 1.0, 0.1, far), Vec3::zeros());
-        assert!(stiffness(&ball, 1.0, 0.1, far, 1.0).is_none());
+        assert_eq!(Contact::at(&ball, 1.0, 0.1, far), None);
     }
 }

@@ -6,7 +6,7 @@
 //! potential, which the static solve minimises; looks and solves alternate until they agree. The
 //! exact stiffness at the end, anchors fixed, has N and n follow p, and is not symmetric.
 
-use super::contact::{self, Surface};
+use super::contact::{Contact, Surface};
 use crate::geometry::{Mat3, Vec3};
 use serde::{Deserialize, Serialize};
 
@@ -29,7 +29,8 @@ impl Grip {
     /// Takes load and normal from where the point, of contact stiffness `kappa` \[N/m\] and offset
     /// `h` \[m\], now is.
     pub fn look(&mut self, surface: &impl Surface, mu: f64, [kappa, h]: [f64; 2], p: Vec3) {
-        let push = contact::force(surface, kappa, h, p);
+        let contact = Contact::at(surface, kappa, h, p);
+        let push = contact.map_or(Vec3::zeros(), |contact| contact.force());
         let load = push.norm();
         if load > 0.0 {
             let anchor = self.anchor.unwrap_or(p);
@@ -128,7 +129,7 @@ impl Grip {
         [kappa, h]: [f64; 2],
         p: Vec3,
     ) -> Option<Mat3> {
-        let pressing = contact::stiffness(surface, kappa, h, p, 1.0)?;
+        let pressing = Contact::at(surface, kappa, h, p)?.stiffness(surface, 1.0);
         Some(self.follow(mu, kappa, p)? * pressing)
     }
 }

@@ -7,6 +7,7 @@
 
 use crate::geometry::Vec3;
 use crate::sim::cloth::{Cloth, Fold, Hinge, Hold, Rest};
+use crate::sim::energy::contact::Surface;
 use crate::sim::energy::friction::Grip;
 use crate::sim::energy::layers::Pair;
 use crate::sim::system::System;
@@ -187,14 +188,14 @@ impl Patch {
     }
 
     /// Its system.
-    pub(super) fn system<'a, S>(&'a self, whole: &System<'a, S>) -> System<'a, S> {
-        System {
-            cloth: &self.cloth,
-            rest: &self.rest,
-            grips: &self.grips,
-            surface: whole.surface,
-            contact: whole.contact,
-        }
+    pub(super) fn system<'a, S: Surface>(&'a self, whole: &System<'a, S>) -> System<'a, S> {
+        System::new(
+            &self.cloth,
+            &self.rest,
+            whole.surface,
+            whole.contact,
+            &self.grips,
+        )
     }
 }
 

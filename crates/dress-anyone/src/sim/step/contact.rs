@@ -239,7 +239,7 @@ impl<const N: usize> Points<N> {
                 let shares = block.corners_of(l).into_iter();
                 let sinks: f64 = shares.map(|(a, share)| look.sinks[a] * share).sum();
                 let least = look.params.thickness - sinks;
-                planes[l] = found.and_then(|(d, gradient)| {
+                planes[l] = found.ok().and_then(|(d, gradient)| {
                     let (normal, raised) = slope(gradient)?;
                     Some((normal, raised, normal.dot(&p) - (d - least)))
                 });

@@ -61,12 +61,12 @@ impl ActedOn {
     }
 
     pub(crate) fn system(&self) -> System<'_, Cone> {
-        System {
-            cloth: &self.cloth,
-            rest: &self.rest,
-            surface: &self.surface,
-            contact: self.contact,
-            grips: &self.grips,
-        }
+        System::new(
+            &self.cloth,
+            &self.rest,
+            &self.surface,
+            self.contact,
+            &self.grips,
+        )
     }
 }

@@ -31,13 +31,8 @@ impl<S: Surface> Setting<'_, S> {
     }
 
     fn system<'r>(&'r self, rest: &'r Rest) -> System<'r, S> {
-        System {
-            cloth: self.scene.cloth,
-            rest,
-            surface: self.scene.surface,
-            contact: self.scene.params.contact,
-            grips: &[],
-        }
+        let scene = &self.scene;
+        System::new(scene.cloth, rest, scene.surface, scene.params.contact, &[])
     }
 
     /// M + Δt² K, with the part `exactness` of all that may make it indefinite.
