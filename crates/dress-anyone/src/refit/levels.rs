@@ -84,29 +84,24 @@ pub(super) fn searched(
             _ => prepared,
         };
         let same = matches!(&last, Ok((mesh, _)) if *mesh == level.mesh);
-        let mut guesses = vec![match &last {
+        let first = match &last {
             Err(_) => from_target(on, flatten(on)),
-            Ok((_, found)) if same => Guess {
-                zeta: found.zeta.clone(),
-                x: found.x.clone(),
-            },
-            Ok((_, found)) if level.rate == 0.0 => let_down(on, &found.zeta, &mut run),
+            Ok((_, found)) if same => Guess::at(found.x.clone(), found.zeta.clone()),
+            Ok((_, found)) if level.rate == 0.0 => let_down(on, found.zeta.clone()),
             Ok((_, found)) => from_target(on, found.zeta.clone()),
-        }];
-        if level.rate == 0.0 {
-            guesses.push(Guess {
-                zeta: on.initial(),
-                x: match level.mesh {
-                    Mesh::Own => initial.clone(),
-                    _ => resample(&prepared.garment.mesh, &initial, &on.garment.mesh),
-                },
-            });
+        };
+        let second = if level.rate == 0.0 {
+            let x = match level.mesh {
+                Mesh::Own => initial.clone(),
+                _ => resample(&prepared.garment.mesh, &initial, &on.garment.mesh),
+            };
+            Some(Guess::at(x, on.initial()))
         } else if number == 0 {
-            guesses.push(from_target(on, on.initial()));
-        } else if same {
+            Some(from_target(on, on.initial()))
+        } else {
             // Not caught in what the last level was.
-            guesses.push(from_target(on, guesses[0].zeta.clone()));
-        }
+            same.then(|| from_target(on, first.zeta.clone()))
+        };
         run.stage(level.stage());
         let keep = Keep {
             params: prepared.params,
@@ -114,7 +109,7 @@ pub(super) fn searched(
             initial: &initial,
             level: number,
         };
-        let found = level.search(on, guesses, checkpoint.take(), keep, &mut run)?;
+        let found = level.search(on, (first, second), checkpoint.take(), keep, &mut run)?;
         let found = found.map_err(|failed| prepared.told(failed));
         if found.is_ok() || number + 1 == levels.len() {
             last = found.map(|found| (level.mesh, found));
@@ -170,26 +165,28 @@ fn first_drape(prepared: &Prepared<'_>, run: &mut Run<'_, '_>) -> Result<Vec<Vec
 
 /// A pattern, and its cloth let down from the target shape by guides that give way one after the other: so it
 /// keeps the folds of the target shape where it can.
-fn let_down(on: &Prepared<'_>, zeta: &[f64], run: &mut Run<'_, '_>) -> Guess {
-    let mut guess = from_target(on, zeta.to_vec());
-    let x_bar = on.cages.deform(zeta);
-    for rate in LET_DOWN {
-        let free = on.scene();
-        let cloth = free.cloth.clone().guided(on.x_star.clone(), rate);
-        let mut sim = almost(&free);
-        sim.equilibrium.iterations = on.params.descent.patience;
-        let scene = Scene {
-            cloth: &cloth,
-            params: &sim,
-            ..free
-        };
-        let found = drape(&scene, &x_bar, guess.x, Start::Near, &mut |p, _| {
-            run.drapes(p)
-        });
-        run.count(&found);
-        guess.x = found.x;
+fn let_down<'a>(on: &'a Prepared<'_>, zeta: Vec<f64>) -> Guess<'a> {
+    let x_bar = on.cages.deform(&zeta);
+    let start = move |run: &mut Run<'_, '_>| {
+        LET_DOWN.into_iter().fold(on.x_star.clone(), |x, rate| {
+            let free = on.scene();
+            let cloth = free.cloth.clone().guided(on.x_star.clone(), rate);
+            let mut sim = almost(&free);
+            sim.equilibrium.iterations = on.params.descent.patience;
+            let scene = Scene {
+                cloth: &cloth,
+                params: &sim,
+                ..free
+            };
+            let found = drape(&scene, &x_bar, x, Start::Near, &mut |p, _| run.drapes(p));
+            run.count(&found);
+            found.x
+        })
+    };
+    Guess {
+        zeta,
+        start: Box::new(start),
     }
-    guess
 }
 
 /// A scene's parameters with drapes that end when they are almost at rest.
@@ -202,9 +199,8 @@ fn almost(scene: &Scene<'_, DistanceField>) -> SimParams {
 }
 
 /// A pattern, to be draped from the target shape.
-fn from_target(on: &Prepared<'_>, zeta: Vec<f64>) -> Guess {
-    let x = on.x_star.clone();
-    Guess { zeta, x }
+fn from_target<'a>(on: &Prepared<'_>, zeta: Vec<f64>) -> Guess<'a> {
+    Guess::at(on.x_star.clone(), zeta)
 }
 
 impl Level {
@@ -217,12 +213,12 @@ impl Level {
         }
     }
 
-    /// The best pattern from several guesses, or on from a checkpoint; why the last failed if none comes
+    /// The best pattern from one or two guesses, or on from a checkpoint; why the last failed if none comes
     /// to rest.
     fn search(
         self,
         on: &Prepared<'_>,
-        guesses: Vec<Guess>,
+        (first, second): (Guess<'_>, Option<Guess<'_>>),
         checkpoint: Option<Checkpoint>,
         keep: Keep<'_>,
         run: &mut Run<'_, '_>,
@@ -257,7 +253,7 @@ impl Level {
             ..on.search(&scene)
         };
         match checkpoint {
-            None => Ok(search.run(guesses, run)),
+            None => Ok(search.run(&first, second.as_ref(), run)),
             Some(noted) => {
                 let found = search.resume(noted, run);
                 found.map(Ok).ok_or(RefitError::OtherCheckpoint)

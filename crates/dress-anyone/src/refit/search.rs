@@ -27,6 +27,8 @@ use nalgebra::DVector;
 use point::{Failed, Point};
 pub(super) use run::Run;
 use serde::{Deserialize, Serialize};
+use std::cell::OnceCell;
+use std::sync::{Mutex, mpsc};
 
 /// Predicted moves of the cloth beyond this are not trusted as a start \[m\].
 const FARTHEST_PREDICTION: f64 = 0.03;
@@ -52,13 +54,23 @@ pub(super) struct Search<'a, S> {
     pub(super) keep: Option<Keep<'a>>,
 }
 
-/// A pattern to begin from, and where its drape starts.
-#[derive(Clone, Debug)]
-pub(super) struct Guess {
+/// A pattern to begin from.
+pub(super) struct Guess<'a> {
     pub(super) zeta: Vec<f64>,
-    /// \[m\].
-    pub(super) x: Vec<Vec3>,
+    /// Where its drape starts \[m\], which may take drapes of its own.
+    pub(super) start: Box<Start<'a>>,
 }
+
+impl Guess<'_> {
+    /// A pattern, to be draped from `x` \[m\].
+    pub(super) fn at(x: Vec<Vec3>, zeta: Vec<f64>) -> Self {
+        let start = Box::new(move |_: &mut Run<'_, '_>| x.clone());
+        Self { zeta, start }
+    }
+}
+
+/// Brings cloth to where a drape starts \[m\].
+pub(super) type Start<'a> = dyn Fn(&mut Run<'_, '_>) -> Vec<Vec3> + Send + Sync + 'a;
 
 /// Where a search ended.
 #[derive(Clone, Debug)]
@@ -125,25 +137,57 @@ impl Steps {
 }
 
 impl<'s, S: Surface> Search<'s, S> {
-    /// Searches from the best of several guesses; why the last failed if none of them comes to rest.
+    /// Searches from the better of two guesses, or from the one there is; why the last failed if none comes to
+    /// rest. Both are draped at the same time where there is a core to spare; the second then waits where it has
+    /// to know how good the first is.
     pub(super) fn run(
         &self,
-        guesses: Vec<Guess>,
+        first: &Guess<'_>,
+        second: Option<&Guess<'_>>,
         run: &mut Run<'_, '_>,
     ) -> Result<Settled, Failed> {
-        let mut best: Option<Box<Point<'s>>> = None;
-        let mut failed = Failed::STOPPED;
-        for guess in guesses {
-            let beaten = best.as_ref().map_or(f64::INFINITY, |best| best.total);
-            match self.trial(&guess.zeta, guess.x, beaten, usize::MAX, run) {
+        let draped = |guess: &Guess<'_>, wanted: &dyn Fn() -> f64, run: &mut Run<'_, '_>| {
+            let start = (guess.start)(run);
+            self.trial(&guess.zeta, start, wanted, usize::MAX, run)
+        };
+        let (tell, told) = mpsc::channel();
+        let told = Mutex::new(told);
+        let one = move |run: &mut Run<'_, '_>| {
+            let found = draped(first, &|| f64::INFINITY, run);
+            // Nobody listens where there is no second.
+            let _ = found
+                .as_ref()
+                .map(|found| found.as_ref().map(|first| tell.send(first.total)));
+            found
+        };
+        let beaten = || {
+            told.lock()
+                .map_or(f64::INFINITY, |told| told.recv().unwrap_or(f64::INFINITY))
+        };
+        let two = |guess: &Guess<'_>, run: &mut Run<'_, '_>| {
+            let known = OnceCell::new();
+            draped(guess, &|| *known.get_or_init(beaten), run)
+        };
+        let aside = second.map(|second| move |run: &mut Run<'_, '_>| two(second, run));
+        let (found, made) = run.beside(self.spare, one, aside, Failed::stopped);
+        let (mut best, mut failed) = (None, Failed::STOPPED);
+        let mut take =
+            |found: Result<Option<Box<Point<'s>>>, Failed>, run: &mut Run<'_, '_>| match found {
                 Ok(Some(next)) => {
-                    let far = best.map_or(0.0, |best| farthest(&next.x_bar, &best.x_bar));
-                    run.note(self, &next, far);
+                    let far = |best: Box<Point<'s>>| farthest(&next.x_bar, &best.x_bar);
+                    run.note(self, &next, best.take().map_or(0.0, far));
                     best = Some(next);
                 }
                 Ok(None) => {}
                 Err(why) => failed = why,
-            }
+            };
+        take(found, run);
+        if let Some(second) = second {
+            let found = match made {
+                Some(made) => run.count_made(made),
+                None => two(second, run),
+            };
+            take(found, run);
         }
         let going = Going {
             best: best.ok_or(failed)?,
@@ -173,8 +217,13 @@ impl<'s, S: Surface> Search<'s, S> {
     }
 
     /// A guess, draped and noted: where it lies \[m\].
-    pub(super) fn first(&self, guess: Guess, run: &mut Run<'_, '_>) -> Result<Vec<Vec3>, Failed> {
-        let first = self.accept(self.candidate(guess.zeta, guess.x, run)?)?;
+    pub(super) fn first(
+        &self,
+        guess: Guess<'_>,
+        run: &mut Run<'_, '_>,
+    ) -> Result<Vec<Vec3>, Failed> {
+        let start = (guess.start)(run);
+        let first = self.accept(self.candidate(guess.zeta, start, run)?)?;
         run.note(self, &first, 0.0);
         Ok(first.x)
     }

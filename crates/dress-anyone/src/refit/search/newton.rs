@@ -95,7 +95,8 @@ impl<'s, S: Surface> Search<'s, S> {
         };
         let draped = |tried: &Try, run: &mut Run<'_, '_>| {
             let start = self.predict(best, &tried.step);
-            self.trial(&tried.zeta, start, best.total, self.params.patience, run)
+            let wanted = || best.total;
+            self.trial(&tried.zeta, start, &wanted, self.params.patience, run)
         };
         let mut made = None;
         loop {
@@ -108,9 +109,8 @@ impl<'s, S: Surface> Search<'s, S> {
             } else {
                 let after = shorter.clone().next().ok();
                 let after = after.map(|after| move |run: &mut Run<'_, '_>| draped(&after, run));
-                let enough = |found: &Result<Option<_>, Failed>| match found {
-                    Ok(better) => better.is_some(),
-                    Err(failed) => failed.status == RestStatus::Stopped,
+                let enough = |found: &Result<Option<_>, Failed>| {
+                    Failed::stopped(found) || matches!(found, Ok(Some(_)))
                 };
                 let (found, aside) =
                     run.beside(self.spare, |run| draped(&tried, run), after, enough);

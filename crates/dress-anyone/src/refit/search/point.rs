@@ -73,6 +73,11 @@ impl Failed {
         residual: f64::NAN,
         broken: None,
     };
+
+    /// Whether it was asked to stop.
+    pub(super) fn stopped<T>(found: &Result<T, Self>) -> bool {
+        (found.as_ref()).is_err_and(|failed| failed.status == RestStatus::Stopped)
+    }
 }
 
 impl<S: Surface> End<'_, S> {
@@ -127,13 +132,14 @@ impl<'s, S: Surface> Search<'s, S> {
         self.draped(zeta, start, all, run)
     }
 
-    /// The same with its gradient, if its loss is below `wanted`: what is not when the cloth is almost at
-    /// rest is not draped to its end, nor is what takes more than `patience` factorisations.
+    /// The same with its gradient, if its loss is below what is `wanted`, which is asked when the cloth is almost
+    /// at rest: what is not better by then is not draped to its end, nor is what takes more than `patience`
+    /// factorisations.
     pub(super) fn trial(
         &self,
         zeta: &[f64],
         start: Vec<Vec3>,
-        wanted: f64,
+        wanted: &dyn Fn() -> f64,
         patience: usize,
         run: &mut Run<'_, '_>,
     ) -> Result<Option<Box<Point<'s>>>, Failed> {
@@ -149,7 +155,7 @@ impl<'s, S: Surface> Search<'s, S> {
             };
             if !promising && residual < ALMOST_AT_REST {
                 let loss = self.losses.evaluate(&x(), &x_bar);
-                promising = self.total(&loss, zeta) < wanted;
+                promising = self.total(&loss, zeta) < wanted();
                 refused = !promising;
             } else {
                 refused = iteration >= patience;
@@ -160,7 +166,7 @@ impl<'s, S: Surface> Search<'s, S> {
         if refused {
             return Ok(None);
         }
-        let better = Some(tried?).filter(|tried| tried.total < wanted);
+        let better = Some(tried?).filter(|tried| tried.total < wanted());
         better.map(|better| self.accept(better)).transpose()
     }
 
