@@ -16,7 +16,7 @@ mod search;
 pub mod transfer;
 mod written;
 
-use crate::body::Body;
+use crate::body::{Body, DistanceField};
 use crate::cage::CageParams;
 use crate::descent::DescentParams;
 use crate::garment::{Fabric, FabricZone, Garment, PressedFold, cuts, fold_lines, unknown_panels};
@@ -30,7 +30,7 @@ use crate::sim::equilibrium::RestStatus;
 use crate::sim::{Cloth, SimParams, Start, drape};
 use crate::transfer::{TransferError, TransferParams};
 use checkpoint::Checkpoint;
-use dress::{HoldParams, drape_on};
+use dress::{HoldParams, drape_on_surface};
 pub use measure::drape_report;
 use prepare::Prepared;
 use serde::{Deserialize, Serialize};
@@ -296,11 +296,11 @@ pub fn refit_from(
 /// The garment's drape on `body`, which must come to rest.
 fn drape_to_rest(
     garment: &Garment,
-    body: &Body,
+    (body, surface): (&Body, &DistanceField),
     params: &RefitParams,
     observe: &mut Observer<'_>,
 ) -> Result<Vec<Vec3>, RefitError> {
-    let found = drape_on(garment, body, params, &mut |p, _| {
+    let found = drape_on_surface(garment, body, surface, params, &mut |p, _| {
         observe(&Progress::Drape(p))
     });
     if found.status == RestStatus::Stopped {

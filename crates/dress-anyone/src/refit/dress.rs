@@ -106,14 +106,29 @@ pub fn drape_on(
     params: &RefitParams,
     observe: &mut Observer<'_>,
 ) -> Drape {
+    drape_on_surface(garment, body, &surface(body), params, observe)
+}
+
+/// A body as cloth feels it.
+pub(super) fn surface(body: &Body) -> DistanceField {
+    DistanceField::new(&body.mesh, DistanceField::SPACING, DistanceField::OUTER)
+}
+
+/// The same on the `surface` of the body.
+pub(super) fn drape_on_surface(
+    garment: &Garment,
+    body: &Body,
+    surface: &DistanceField,
+    params: &RefitParams,
+    observe: &mut Observer<'_>,
+) -> Drape {
     let (hold, sim) = (&params.hold, &params.sim);
-    let surface = DistanceField::new(&body.mesh, DistanceField::SPACING, DistanceField::OUTER);
     let mut patient = *sim;
     patient.equilibrium.iterations *= PATIENCE;
     let mut drape = |hold: &HoldParams, sim: &SimParams| {
         let on = Dressing {
             body,
-            surface: &surface,
+            surface,
             params,
             hold,
         };

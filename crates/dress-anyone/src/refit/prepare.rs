@@ -1,7 +1,7 @@
 //! What a search works on: the target shape (paper §4.2), cages (§4.3) with their symmetry (§4.5), the
 //! initial scale (§4.6), the body to drape on and the loss (§4.4).
 
-use super::dress::holds;
+use super::dress::{holds, surface};
 use super::search::aside::Spare;
 use super::search::point::Failed;
 use super::search::{self, Search};
@@ -62,10 +62,10 @@ impl<'a> Prepared<'a> {
         }
         let mesh = &garment.mesh;
         let layout = Layout::of(garment, &params.transfer).map_err(RefitError::Garment)?;
-        let field =
-            || DistanceField::new(&target.mesh, DistanceField::SPACING, DistanceField::OUTER);
+        // All cores make the source's surface, for the drape waits for it; the target's then has time.
+        let on_source = OnSource::new(garment, source, params, clock, observe)?;
         let aim = || {
-            let source_drape = on_source(garment, source, params, clock, observe)?;
+            let source_drape = on_source.drape(params, observe)?;
             let x_star = if let Some(x_star) = x_star {
                 x_star
             } else {
@@ -75,7 +75,7 @@ impl<'a> Prepared<'a> {
             clock.stage("target body", observe);
             Ok::<_, RefitError>((source_drape, x_star))
         };
-        let (aim, surface) = Spare::all().both(aim, field);
+        let (aim, surface) = Spare::all().both(aim, || surface(target));
         let (source_drape, x_star) = aim?;
 
         clock.stage("cages", observe);
@@ -202,22 +202,58 @@ impl<'a> Prepared<'a> {
     }
 }
 
-/// The garment on the source body \[m\]: as its file has it, or from the placed panels.
-pub(super) fn on_source(
-    garment: &Garment,
-    source: &Body,
-    params: &RefitParams,
-    clock: &mut Clock,
-    observe: &mut Observer<'_>,
-) -> Result<Vec<Vec3>, RefitError> {
-    let problems = params.problems(&garment.pattern);
-    if !problems.is_empty() {
-        return Err(RefitError::Garment(problems));
+/// A garment about to be draped on the source body.
+pub(super) struct OnSource<'a> {
+    garment: &'a Garment,
+    source: &'a Body,
+    drape: SourceDrape<'a>,
+}
+
+/// The garment's drape on the source body.
+enum SourceDrape<'a> {
+    /// Its file has it \[m\].
+    Brought(&'a [Vec3]),
+    /// To be made on this surface.
+    Wanted(DistanceField),
+}
+
+impl<'a> OnSource<'a> {
+    /// Checks what `params` name, and makes what the drape needs.
+    pub(super) fn new(
+        garment: &'a Garment,
+        source: &'a Body,
+        params: &RefitParams,
+        clock: &mut Clock,
+        observe: &mut Observer<'_>,
+    ) -> Result<Self, RefitError> {
+        let problems = params.problems(&garment.pattern);
+        if !problems.is_empty() {
+            return Err(RefitError::Garment(problems));
+        }
+        clock.stage("source drape", observe);
+        let drape = match &garment.drape {
+            Some(x) => SourceDrape::Brought(x),
+            None => SourceDrape::Wanted(surface(source)),
+        };
+        Ok(Self {
+            garment,
+            source,
+            drape,
+        })
     }
-    clock.stage("source drape", observe);
-    match &garment.drape {
-        Some(x) => Ok(x.clone()),
-        None => drape_to_rest(garment, source, params, observe),
+
+    /// The garment on the source body \[m\]: as its file has it, or from the placed panels.
+    pub(super) fn drape(
+        &self,
+        params: &RefitParams,
+        observe: &mut Observer<'_>,
+    ) -> Result<Vec<Vec3>, RefitError> {
+        match &self.drape {
+            SourceDrape::Brought(x) => Ok(x.to_vec()),
+            SourceDrape::Wanted(surface) => {
+                drape_to_rest(self.garment, (self.source, surface), params, observe)
+            }
+        }
     }
 }
 

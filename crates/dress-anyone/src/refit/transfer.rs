@@ -3,7 +3,7 @@
 
 mod judge;
 
-use super::prepare::on_source;
+use super::prepare::OnSource;
 use super::{Clock, Observer, RefitError, RefitParams};
 use crate::body::Body;
 use crate::garment::Garment;
@@ -117,7 +117,8 @@ pub fn transfer(
 ) -> Result<Transfer, RefitError> {
     let mut clock = Clock::new();
     let mut layout = Layout::of(garment, &params.transfer).map_err(RefitError::Garment)?;
-    let source_drape = on_source(garment, source, params, &mut clock, observe)?;
+    let on_source = OnSource::new(garment, source, params, &mut clock, observe)?;
+    let source_drape = on_source.drape(params, observe)?;
     if let Some(paint) = paint {
         let painted = paint.onto(&source_drape);
         layout.ease = painted.map_err(|problem| RefitError::Garment(vec![problem]))?;

@@ -18,6 +18,7 @@ use crate::geometry::Vec3;
 use crate::sim::cloth::Cloth;
 use crate::sim::energy::contact::{ContactParams, Surface};
 use pulp::Simd;
+use rayon::prelude::*;
 
 /// Contact points of a part of a cloth: vertices, points of sides, points within triangles.
 #[derive(Default)]
@@ -103,6 +104,8 @@ pub(super) struct Hat {
     pub(super) lambda: Four,
 }
 
+/// Blocks that a thread looks at in one go at least.
+const LOOKS: usize = 64;
 /// Slope of the distance below which it is that of a crease deep in the body \[–\].
 const CREASE: f64 = 0.5;
 
@@ -229,30 +232,11 @@ impl<const N: usize> Points<N> {
     }
 
     fn look(&mut self, look: Look<'_, impl Surface>) {
-        self.near.clear();
         self.tape.clear();
-        for (i, (block, points)) in self.blocks.iter_mut().zip(&self.elements).enumerate() {
-            let mut planes = [None; LANES];
-            for (l, _) in points.each() {
-                let p = block.point(l, look.rows);
-                let found = look.surface.distance_below(p, look.reach);
-                let shares = block.corners_of(l).into_iter();
-                let sinks: f64 = shares.map(|(a, share)| look.sinks[a] * share).sum();
-                let least = look.params.thickness - sinks;
-                planes[l] = found.ok().and_then(|(d, gradient)| {
-                    let (normal, raised) = slope(gradient)?;
-                    Some((normal, raised, normal.dot(&p) - (d - least)))
-                });
-            }
-            if planes.iter().any(Option::is_some) {
-                for (l, plane) in planes.into_iter().enumerate() {
-                    // What is nowhere near, and lanes left over, never push: c = 1.
-                    let nowhere = (Vec3::zeros(), 1.0, -1.0);
-                    block.set(l, plane.unwrap_or(nowhere), look.rows);
-                }
-                self.near.push(i);
-            }
-        }
+        let blocks = self.blocks.par_iter_mut().zip(&self.elements);
+        let blocks = blocks.enumerate().with_min_len(LOOKS);
+        let near = blocks.filter_map(|(i, (block, points))| block.look(points, look).then_some(i));
+        self.near = near.collect();
         self.rubbed.clear();
         self.hats.clear();
         self.hats.resize(self.near.len(), Hat::default());
@@ -307,6 +291,31 @@ impl<const N: usize> Points<N> {
 }
 
 impl<const N: usize> Block<N> {
+    /// Takes the planes of its points, and tells whether any is near.
+    fn look(&mut self, points: &Elements, look: Look<'_, impl Surface>) -> bool {
+        let mut planes = [None; LANES];
+        for (l, _) in points.each() {
+            let p = self.point(l, look.rows);
+            let found = look.surface.distance_below(p, look.reach);
+            let shares = self.corners_of(l).into_iter();
+            let sinks: f64 = shares.map(|(a, share)| look.sinks[a] * share).sum();
+            let least = look.params.thickness - sinks;
+            planes[l] = found.ok().and_then(|(d, gradient)| {
+                let (normal, raised) = slope(gradient)?;
+                Some((normal, raised, normal.dot(&p) - (d - least)))
+            });
+        }
+        let is_near = planes.iter().any(Option::is_some);
+        if is_near {
+            for (l, plane) in planes.into_iter().enumerate() {
+                // What is nowhere near, and lanes left over, never push: c = 1.
+                let nowhere = (Vec3::zeros(), 1.0, -1.0);
+                self.set(l, plane.unwrap_or(nowhere), look.rows);
+            }
+        }
+        is_near
+    }
+
     /// The corners of point `l`, with their shares.
     pub(super) fn corners_of(&self, l: usize) -> [(usize, f64); N] {
         std::array::from_fn(|k| (self.corners[k][l] as usize, self.shares[k].0[l]))
