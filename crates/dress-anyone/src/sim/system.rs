@@ -376,11 +376,46 @@ impl<'a, S: Surface> System<'a, S> {
 mod tests {
     use super::fixtures::ActedOn;
     use super::*;
+    use crate::body::DistanceField;
     use crate::check::{assert_derivative, noise};
+    use crate::geometry::closest_point::tests::sphere;
     use crate::sim::cloth::fixtures;
     use crate::sim::energy::layers::LayerParams;
     use crate::sim::layers::Layers;
     use crate::sim::material::OrFabric;
+
+    #[test]
+    fn what_is_remembered_of_the_body_changes_no_energy_however_the_cloth_moves() {
+        let mesh = fixtures::sheet(12, 12, 0.01);
+        let cloth = Cloth::new(&mesh, &fixtures::SOFT);
+        let rest = cloth.at_rest(&mesh.x_bar);
+        let ball = DistanceField::new(&sphere(0.1, 3), 5e-3, 0.03);
+        let contact = ContactParams::default();
+        let system = System::new(&cloth, &rest, &ball, contact, &[]);
+        let mut touching = 0;
+        // Above the ball, down onto it in steps of up to 4 mm, through it, and back.
+        let heights = [
+            0.15, 0.12, 0.104, 0.1025, 0.102, 0.099, 0.098, 0.05, 0.0, 0.101, 0.103, 0.13,
+        ];
+        for (n, height) in heights.into_iter().enumerate() {
+            let place = |(v, p): (usize, &crate::geometry::Vec2)| {
+                let shake = Vec3::from_fn(|c, _| 1e-3 * noise(97 * n + 3 * v + c));
+                Vec3::new(p.x - 0.06, height, p.y - 0.06) + shake
+            };
+            let x: Vec<Vec3> = mesh.x_bar.iter().enumerate().map(place).collect();
+            let anew = System::new(&cloth, &rest, &ball, contact, &[]);
+            assert_eq!(system.energy(&x, &[]), anew.energy(&x, &[]));
+            assert_eq!(system.force(&x, &[]), anew.force(&x, &[]));
+            let all = 0..cloth.contacts.len();
+            touching += all.filter(|i| system.contact(*i, &x).is_some()).count();
+        }
+        // Some do at most of these heights, and never all of them but within the ball.
+        let looks = heights.len() * cloth.contacts.len();
+        assert!(
+            touching > looks / 20 && touching < looks / 2,
+            "{touching} of {looks}"
+        );
+    }
 
     #[test]
     fn force_and_stiffness_are_derivatives_of_the_energy() {
