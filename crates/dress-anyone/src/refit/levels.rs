@@ -90,18 +90,19 @@ pub(super) fn searched(
             Ok((_, found)) if level.rate == 0.0 => let_down(on, found.zeta.clone()),
             Ok((_, found)) => from_target(on, found.zeta.clone()),
         };
-        let second = if level.rate == 0.0 {
+        let mut guesses = vec![first];
+        if level.rate == 0.0 {
             let x = match level.mesh {
                 Mesh::Own => initial.clone(),
                 _ => resample(&prepared.garment.mesh, &initial, &on.garment.mesh),
             };
-            Some(Guess::at(x, on.initial()))
+            guesses.push(Guess::at(x, on.initial()));
         } else if number == 0 {
-            Some(from_target(on, on.initial()))
-        } else {
+            guesses.push(from_target(on, on.initial()));
+        } else if same {
             // Not caught in what the last level was.
-            same.then(|| from_target(on, first.zeta.clone()))
-        };
+            guesses.push(from_target(on, guesses[0].zeta.clone()));
+        }
         run.stage(level.stage());
         let keep = Keep {
             params: prepared.params,
@@ -109,7 +110,7 @@ pub(super) fn searched(
             initial: &initial,
             level: number,
         };
-        let found = level.search(on, (first, second), checkpoint.take(), keep, &mut run)?;
+        let found = level.search(on, guesses, checkpoint.take(), keep, &mut run)?;
         let found = found.map_err(|failed| prepared.told(failed));
         if found.is_ok() || number + 1 == levels.len() {
             last = found.map(|found| (level.mesh, found));
@@ -213,12 +214,12 @@ impl Level {
         }
     }
 
-    /// The best pattern from one or two guesses, or on from a checkpoint; why the last failed if none comes
+    /// The best pattern from several guesses, or on from a checkpoint; why the last failed if none comes
     /// to rest.
     fn search(
         self,
         on: &Prepared<'_>,
-        (first, second): (Guess<'_>, Option<Guess<'_>>),
+        guesses: Vec<Guess<'_>>,
         checkpoint: Option<Checkpoint>,
         keep: Keep<'_>,
         run: &mut Run<'_, '_>,
@@ -253,7 +254,7 @@ impl Level {
             ..on.search(&scene)
         };
         match checkpoint {
-            None => Ok(search.run(&first, second.as_ref(), run)),
+            None => Ok(search.run(&guesses, run)),
             Some(noted) => {
                 let found = search.resume(noted, run);
                 found.map(Ok).ok_or(RefitError::OtherCheckpoint)

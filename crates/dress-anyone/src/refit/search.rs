@@ -28,7 +28,7 @@ use point::{Failed, Point};
 pub(super) use run::Run;
 use serde::{Deserialize, Serialize};
 use std::cell::OnceCell;
-use std::sync::{Mutex, mpsc};
+use std::sync::mpsc;
 
 /// Predicted moves of the cloth beyond this are not trusted as a start \[m\].
 const FARTHEST_PREDICTION: f64 = 0.03;
@@ -137,13 +137,12 @@ impl Steps {
 }
 
 impl<'s, S: Surface> Search<'s, S> {
-    /// Searches from the better of two guesses, or from the one there is; why the last failed if none comes to
-    /// rest. Both are draped at the same time where there is a core to spare; the second then waits where it has
-    /// to know how good the first is.
+    /// Searches from the best of several guesses; why the last failed if none comes to rest. The first two are
+    /// draped at the same time where there is a core to spare; the second then waits where it has to know how good
+    /// the first is.
     pub(super) fn run(
         &self,
-        first: &Guess<'_>,
-        second: Option<&Guess<'_>>,
+        guesses: &[Guess<'_>],
         run: &mut Run<'_, '_>,
     ) -> Result<Settled, Failed> {
         let draped = |guess: &Guess<'_>, wanted: &dyn Fn() -> f64, run: &mut Run<'_, '_>| {
@@ -151,43 +150,45 @@ impl<'s, S: Surface> Search<'s, S> {
             self.trial(&guess.zeta, start, wanted, usize::MAX, run)
         };
         let (tell, told) = mpsc::channel();
-        let told = Mutex::new(told);
-        let one = move |run: &mut Run<'_, '_>| {
-            let found = draped(first, &|| f64::INFINITY, run);
-            // Nobody listens where there is no second.
-            let _ = found
-                .as_ref()
-                .map(|found| found.as_ref().map(|first| tell.send(first.total)));
+        let first = |run: &mut Run<'_, '_>| {
+            let found = draped(&guesses[0], &|| f64::INFINITY, run);
+            if let Ok(Some(first)) = &found {
+                // Nobody listens where there is no second.
+                let _ = tell.send(first.total);
+            }
+            drop(tell);
             found
         };
-        let beaten = || {
-            told.lock()
-                .map_or(f64::INFINITY, |told| told.recv().unwrap_or(f64::INFINITY))
-        };
-        let two = |guess: &Guess<'_>, run: &mut Run<'_, '_>| {
-            let known = OnceCell::new();
-            draped(guess, &|| *known.get_or_init(beaten), run)
-        };
-        let aside = second.map(|second| move |run: &mut Run<'_, '_>| two(second, run));
-        let (found, made) = run.beside(self.spare, one, aside, Failed::stopped);
-        let (mut best, mut failed) = (None, Failed::STOPPED);
-        let mut take =
-            |found: Result<Option<Box<Point<'s>>>, Failed>, run: &mut Run<'_, '_>| match found {
+        let second = guesses.get(1).map(|guess| {
+            move |run: &mut Run<'_, '_>| {
+                let known = OnceCell::new();
+                let beaten = || told.recv().unwrap_or(f64::INFINITY);
+                draped(guess, &|| *known.get_or_init(beaten), run)
+            }
+        });
+        let (found, mut made) = run.beside(self.spare, first, second, Failed::stopped);
+        let mut found = Some(found);
+        let mut best: Option<Box<Point<'s>>> = None;
+        let mut failed = Failed::STOPPED;
+        for guess in guesses {
+            let beaten = best.as_ref().map_or(f64::INFINITY, |best| best.total);
+            let found = match (found.take(), made.take()) {
+                (Some(found), later) => {
+                    made = later;
+                    found
+                }
+                (None, Some(made)) => run.count_made(made),
+                (None, None) => draped(guess, &|| beaten, run),
+            };
+            match found {
                 Ok(Some(next)) => {
-                    let far = |best: Box<Point<'s>>| farthest(&next.x_bar, &best.x_bar);
-                    run.note(self, &next, best.take().map_or(0.0, far));
+                    let far = best.map_or(0.0, |best| farthest(&next.x_bar, &best.x_bar));
+                    run.note(self, &next, far);
                     best = Some(next);
                 }
                 Ok(None) => {}
                 Err(why) => failed = why,
-            };
-        take(found, run);
-        if let Some(second) = second {
-            let found = match made {
-                Some(made) => run.count_made(made),
-                None => two(second, run),
-            };
-            take(found, run);
+            }
         }
         let going = Going {
             best: best.ok_or(failed)?,
