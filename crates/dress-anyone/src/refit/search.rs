@@ -147,7 +147,7 @@ impl<'s, S: Surface> Search<'s, S> {
     ) -> Result<Settled, Failed> {
         let draped = |guess: &Guess<'_>, wanted: &dyn Fn() -> f64, run: &mut Run<'_, '_>| {
             let start = (guess.start)(run);
-            self.trial(&guess.zeta, start, wanted, usize::MAX, run)
+            self.trial(&guess.zeta, start, wanted, None, run)
         };
         let (tell, told) = mpsc::channel();
         let first = |run: &mut Run<'_, '_>| {

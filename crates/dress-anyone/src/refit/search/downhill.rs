@@ -57,7 +57,7 @@ impl<'s, S: Surface> Search<'s, S> {
             if can_be_cut(self.cages, self.mesh, &zeta, floor) {
                 let wanted = best.total + WORTH * gradient.dot(&step);
                 let start = self.predict(best, &step);
-                match self.trial(&zeta, start, &|| wanted, self.params.patience, run) {
+                match self.trial(&zeta, start, &|| wanted, Some(self.params.patience), run) {
                     Err(failed) if failed.status == RestStatus::Stopped => {
                         return Stepped::Interrupted;
                     }

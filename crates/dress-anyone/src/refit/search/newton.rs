@@ -96,7 +96,7 @@ impl<'s, S: Surface> Search<'s, S> {
         let draped = |tried: &Try, run: &mut Run<'_, '_>| {
             let start = self.predict(best, &tried.step);
             let wanted = || best.total;
-            self.trial(&tried.zeta, start, &wanted, self.params.patience, run)
+            self.trial(&tried.zeta, start, &wanted, Some(self.params.patience), run)
         };
         let mut made = None;
         loop {

@@ -18,6 +18,11 @@ use nalgebra::DVector;
 /// percent or two.
 pub(in crate::refit) const ALMOST_AT_REST: f64 = 0.1;
 
+/// Residual below which cloth settles \[–\]: from there its loss seldom changes by more than a few percent.
+const SETTLING: f64 = 3.0;
+/// Loss meanwhile, as part of the wanted one, from which there is no way back.
+const HOPELESS: f64 = 1.1;
+
 /// Told how a trial's drape is getting on; whether to go on with it.
 type Judge<'a> = dyn FnMut(DrapeProgress, &dyn Fn() -> Vec<Vec3>) -> bool + 'a;
 
@@ -133,14 +138,14 @@ impl<'s, S: Surface> Search<'s, S> {
     }
 
     /// The same with its gradient, if its loss is below what is `wanted`, which is asked when the cloth is almost
-    /// at rest: what is not better by then is not draped to its end, nor is what takes more than `patience`
-    /// factorisations.
+    /// at rest: what is not better by then is not draped to its end. With `patience`, neither is what takes more than
+    /// so many factorisations, nor what is far from better while it settles: cloth may snap into another state.
     pub(super) fn trial(
         &self,
         zeta: &[f64],
         start: Vec<Vec3>,
         wanted: &dyn Fn() -> f64,
-        patience: usize,
+        patience: Option<usize>,
         run: &mut Run<'_, '_>,
     ) -> Result<Option<Box<Point<'s>>>, Failed> {
         let x_bar = self.cages.deform(zeta);
@@ -153,12 +158,13 @@ impl<'s, S: Surface> Search<'s, S> {
             else {
                 return true;
             };
+            let total = || self.total(&self.losses.evaluate(&x(), &x_bar), zeta);
             if !promising && residual < ALMOST_AT_REST {
-                let loss = self.losses.evaluate(&x(), &x_bar);
-                promising = self.total(&loss, zeta) < wanted();
+                promising = total() < wanted();
                 refused = !promising;
-            } else {
-                refused = iteration >= patience;
+            } else if let Some(most) = patience {
+                let hopeless = residual < SETTLING && !(total() < HOPELESS * wanted());
+                refused = hopeless || iteration >= most;
             }
             !refused
         };
