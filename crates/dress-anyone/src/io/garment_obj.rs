@@ -68,7 +68,14 @@ fn assemble(
     let border = border::trace(&islands)?;
     let tags = tags::parse(&document.comments, &mut notes);
     let (frame, uv_scale) = match &tags {
-        Some(tags) => (tags.frame(), tags.frame().metres_per_unit),
+        Some(tags) => {
+            if *options != UvOptions::default() {
+                let text = "its comments (`# dress:`) tell unit, up axis and scale: what was told of them \
+                            besides is not used";
+                notes.push(text.to_owned());
+            }
+            (tags.frame(), tags.frame().metres_per_unit)
+        }
         None => scale::find(&document, &islands, options, &mut notes)?,
     };
     let x_bar: Vec<Vec2> = islands

@@ -277,6 +277,26 @@ fn a_summary_counts_cloth_and_open_edges() {
 }
 
 #[test]
+fn what_is_told_against_the_comments_of_a_file_is_left_aside_and_said_so() {
+    let options = UvOptions {
+        uv_scale: Some(2.0),
+        ..UvOptions::default()
+    };
+    let text = text_of(&tube(false), INCHES);
+    let read = parse(&text, &options).unwrap();
+    assert_eq!(read.garment.mesh.x_bar.len(), tube(false).mesh.x_bar.len());
+    assert_eq!(
+        (read.frame, read.uv_scale),
+        (INCHES, INCHES.metres_per_unit)
+    );
+    assert!(
+        read.notes.iter().any(|note| note.contains("is not used")),
+        "{:?}",
+        read.notes
+    );
+}
+
+#[test]
 fn comments_that_do_not_fit_the_mesh_are_not_believed() {
     let text = text_of(&tube(false), FileFrame::SI);
     for (from, to) in [
