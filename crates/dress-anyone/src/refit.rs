@@ -4,6 +4,7 @@
 //! (§4.5) → initial scale, all these in `refit/prepare.rs` → drapes and steps (§3, §4.4) → the
 //! pattern as written.
 
+mod apart;
 pub mod checkpoint;
 pub mod dress;
 mod flatten;
@@ -262,6 +263,13 @@ pub fn refit_from(
         Start::Near,
         &mut |_, _| true,
     );
+    let last = if found.ending == Ending::Interrupted {
+        last
+    } else {
+        apart::apart(garment, &scene, &written.x_bar, last, &mut |p, _| {
+            observe(&Progress::Drape(p))
+        })
+    };
     clock.stage("done", observe);
 
     let measured = measure::Measured {
