@@ -110,7 +110,7 @@ pub(super) fn searched(
             initial: &initial,
             level: number,
         };
-        let found = level.search(on, guesses, checkpoint.take(), keep, &mut run)?;
+        let found = level.search(on, &guesses, checkpoint.take(), keep, &mut run)?;
         let found = found.map_err(|failed| prepared.told(failed));
         if found.is_ok() || number + 1 == levels.len() {
             last = found.map(|found| (level.mesh, found));
@@ -219,7 +219,7 @@ impl Level {
     fn search(
         self,
         on: &Prepared<'_>,
-        guesses: Vec<Guess<'_>>,
+        guesses: &[Guess<'_>],
         checkpoint: Option<Checkpoint>,
         keep: Keep<'_>,
         run: &mut Run<'_, '_>,
@@ -254,7 +254,7 @@ impl Level {
             ..on.search(&scene)
         };
         match checkpoint {
-            None => Ok(search.run(&guesses, run)),
+            None => Ok(search.run(guesses, run)),
             Some(noted) => {
                 let found = search.resume(noted, run);
                 found.map(Ok).ok_or(RefitError::OtherCheckpoint)
