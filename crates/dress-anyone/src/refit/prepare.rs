@@ -244,14 +244,14 @@ impl<'a> OnSource<'a> {
 
     /// The garment on the source body \[m\]: as its file has it, or from the placed panels.
     pub(super) fn drape(
-        &self,
+        self,
         params: &RefitParams,
         observe: &mut Observer<'_>,
     ) -> Result<Vec<Vec3>, RefitError> {
-        match &self.drape {
+        match self.drape {
             SourceDrape::Brought(x) => Ok(x.to_vec()),
             SourceDrape::Wanted(surface) => {
-                drape_to_rest(self.garment, (self.source, surface), params, observe)
+                drape_to_rest(self.garment, (self.source, &surface), params, observe)
             }
         }
     }

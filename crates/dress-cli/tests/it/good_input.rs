@@ -94,6 +94,27 @@ fn a_cloth_laid_on_a_box_is_draped_and_told_of() {
 }
 
 #[test]
+fn two_threads_refit_as_one_does() {
+    let place = Workplace::new();
+    let written = |threads| {
+        let line = [
+            "refit",
+            "--resolution",
+            "40",
+            "--out",
+            threads,
+            "--threads",
+            threads,
+        ];
+        let ran = place.dress(&line);
+        assert_eq!(ran.code, 0, "{}", ran.stderr);
+        let read = |name| std::fs::read(place.path(threads).join(name)).unwrap();
+        ["pattern.json", "garment.obj", "initial.obj"].map(read)
+    };
+    assert!(written("1") == written("2"), "what is written differs");
+}
+
+#[test]
 fn panels_are_draped_in_fabrics_of_their_own() {
     let place = Workplace::new();
     place.file(
