@@ -1,5 +1,5 @@
-//! A last drape in which layers go through each other, brought apart. The target shape may go through itself, where
-//! layers meet at a hem or under an arm; cloth that is let down from there does not feel what it goes through.
+//! A last drape in which layers go through each other, brought apart. Drapes of a search start where a step is
+//! predicted to lead, or from a shape that was carried over; where that goes through itself, cloth does not feel it.
 
 use crate::body::DistanceField;
 use crate::garment::Garment;
