@@ -4,7 +4,6 @@
 //! (§4.5) → initial scale, all these in `refit/prepare.rs` → drapes and steps (§3, §4.4) → the
 //! pattern as written.
 
-mod apart;
 pub mod checkpoint;
 pub mod dress;
 mod flatten;
@@ -15,6 +14,7 @@ mod prepare;
 pub mod recovery;
 mod search;
 pub mod transfer;
+mod untangle;
 mod written;
 
 use crate::body::{Body, DistanceField};
@@ -36,6 +36,7 @@ pub use measure::drape_report;
 use prepare::Prepared;
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
+use untangle::untangled;
 
 /// Everything about how to refit.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -266,7 +267,7 @@ pub fn refit_from(
     let last = if found.ending == Ending::Interrupted {
         last
     } else {
-        apart::apart(garment, &scene, &written.x_bar, last, &mut |p, _| {
+        untangled(garment, &scene, &written.x_bar, last, &mut |p, _| {
             observe(&Progress::Drape(p))
         })
     };

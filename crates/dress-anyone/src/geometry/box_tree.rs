@@ -204,7 +204,7 @@ pub fn around(points: &[Vec3], margin: f64) -> Aabb {
 }
 
 /// Whether two boxes have a point in common.
-pub fn overlap(a: &Aabb, b: &Aabb) -> bool {
+fn overlap(a: &Aabb, b: &Aabb) -> bool {
     a[0].x <= b[1].x
         && b[0].x <= a[1].x
         && a[0].y <= b[1].y

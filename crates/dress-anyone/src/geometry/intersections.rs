@@ -6,7 +6,7 @@
 //! tolerance decides. Touching is no intersection; neither is sharing a vertex.
 
 use super::Vec3;
-use super::box_tree::{Aabb, BoxTree, around, overlap};
+use super::box_tree::{Aabb, BoxTree, around};
 use rayon::prelude::*;
 use robust::{Coord3D, orient3d};
 
@@ -27,25 +27,11 @@ pub fn between(
     y: &[Vec3],
     others: &[[u32; 3]],
 ) -> Vec<[u32; 2]> {
-    // Only what comes near needs to be sorted into a tree: most of a body is far from a panel.
-    let whole = around(x, 0.0);
-    let mut near = Vec::new();
-    let mut near_boxes = Vec::new();
-    for (t, boxed) in boxes(y, others).into_iter().enumerate() {
-        if overlap(&boxed, &whole) {
-            near.push(t as u32);
-            near_boxes.push(boxed);
-        }
-    }
-    let pierced = |i: u32, j: u32| {
-        let (s, t) = (triangles[i as usize], others[near[j as usize] as usize]);
+    let tree = BoxTree::new(&boxes(y, others));
+    collect(&boxes(x, triangles), &tree, |i, j| {
+        let (s, t) = (triangles[i as usize], others[j as usize]);
         intersect(corners(x, s), corners(y, t))
-    };
-    let pairs = collect(&boxes(x, triangles), &BoxTree::new(&near_boxes), pierced);
-    pairs
-        .into_iter()
-        .map(|[i, j]| [i, near[j as usize]])
-        .collect()
+    })
 }
 
 /// Whether an edge of one triangle pierces the other.

@@ -15,7 +15,7 @@ const KEPT: f64 = 0.12;
 
 /// The drape `found` of a rest shape, or one near it in which nothing goes through itself, if there is one. Time
 /// steps bring all of the cloth apart; then the surroundings of what was through itself settle in `found`.
-pub(super) fn apart(
+pub(super) fn untangled(
     garment: &Garment,
     scene: &Scene<'_, DistanceField>,
     x_bar: &[Vec2],
@@ -44,7 +44,7 @@ pub(super) fn apart(
     if is_apart(&settled) { settled } else { stepped }
 }
 
-/// `new` near some `places`, and `old` far from them \[m\].
+/// `new` near some `places`, of which there are few, and `old` far from them \[m\].
 fn blended(old: &[Vec3], new: &[Vec3], places: &[Vec3]) -> Vec<Vec3> {
     let blend = |(old, new): (&Vec3, &Vec3)| {
         let squares = places.iter().map(|place| (old - place).norm_squared());
