@@ -352,6 +352,16 @@ impl Clock {
         }
     }
 
+    /// A clock for work beside this one's.
+    fn same_start(&self) -> Self {
+        Self {
+            start: self.start,
+            before: self.before,
+            current: None,
+            stages: Vec::new(),
+        }
+    }
+
     /// Ends the current stage and begins another.
     fn stage(&mut self, stage: &'static str, observe: &mut Observer<'_>) {
         if let Some((stage, since)) = self.current.replace((stage, Instant::now())) {

@@ -19,7 +19,7 @@ pub struct Checkpoint {
     pub(super) params: RefitParams,
     /// The target shape \[m\], which follows from garment and bodies.
     pub(super) x_star: Vec<Vec3>,
-    /// The drape of the initial guess \[m\].
+    /// The drape of the initial guess \[m\]; none in levels that do without it.
     pub(super) initial: Vec<Vec3>,
     /// The level of the search that it is of, with the mesh of that level.
     pub(super) level: usize,
@@ -50,7 +50,7 @@ pub struct Checkpoint {
 impl Checkpoint {
     /// Accepted steps so far.
     pub fn iterations(&self) -> usize {
-        self.notes.len().saturating_sub(1)
+        self.notes.last().map_or(0, |last| last.iteration)
     }
 
     /// Whether it is of this refit, which has so many levels: same parameters, same target shape to the
@@ -58,7 +58,7 @@ impl Checkpoint {
     pub(super) fn is_of(&self, params: &RefitParams, x_star: &[Vec3], levels: usize) -> bool {
         self.params == *params
             && self.x_star == x_star
-            && self.initial.len() == x_star.len()
+            && [0, x_star.len()].contains(&self.initial.len())
             && self.level < levels
             && !self.notes.is_empty()
     }

@@ -17,9 +17,12 @@ use crate::body::DistanceField;
 use crate::descent::{Gradient, Optimizer};
 use crate::geometry::Vec3;
 use crate::pattern::resample::resample;
-use crate::report::Ending;
+use crate::report::{Ending, Iteration};
 use crate::sim::{Scene, SimParams, Start, drape};
+use std::ops::Range;
 
+/// The stage in which the first guess is waited for.
+const FIRST_GUESS: &str = "first guess";
 /// Rates of the guides \[1/s²\]: weight stretches them by 1 and 10 cm.
 const RATES: [f64; 2] = [1000.0, 100.0];
 /// Rates by which the cloth of a pattern found in a coarser mesh is let down \[1/s²\].
@@ -47,7 +50,15 @@ struct Level {
     rate: f64,
 }
 
-/// The best pattern. A checkpoint is of one of the levels; those before it are not searched again.
+/// The garment in the meshes that are searched.
+struct Meshes<'a> {
+    own: &'a Prepared<'a>,
+    medium: Option<Prepared<'a>>,
+    coarse: Option<Prepared<'a>>,
+}
+
+/// The best pattern. A checkpoint is of one of the levels; those before it are not searched again. Guided levels do
+/// without the drape of the first guess, which is made beside them.
 pub(super) fn searched(
     prepared: &Prepared<'_>,
     mut checkpoint: Option<Checkpoint>,
@@ -62,61 +73,40 @@ pub(super) fn searched(
             .map(|garment| prepared.on_mesh_of(garment))
             .transpose()
     });
-    let (medium, coarse) = (medium?, coarse?);
-    let levels = levels(params.descent.gradient, medium.is_some(), coarse.is_some());
+    let meshes = Meshes {
+        own: prepared,
+        medium: medium?,
+        coarse: coarse?,
+    };
+    let levels = meshes.levels();
+    let guided = levels.iter().filter(|level| level.rate > 0.0).count();
     let mut run = Run::new(clock, observe);
-    let (from, initial) = match &checkpoint {
-        None => (0, first_drape(prepared, &mut run)?),
-        Some(noted) if noted.is_of(prepared.params, &prepared.x_star, levels.len()) => {
+    let (from, mut initial) = match &checkpoint {
+        None => (0, Vec::new()),
+        Some(noted) if noted.is_of(params, &prepared.x_star, levels.len()) => {
             run.take_up(noted);
             (noted.level, noted.initial.clone())
         }
         Some(_) => return Err(RefitError::OtherCheckpoint),
     };
-    let mut last: Result<(Mesh, Settled), RefitError> = Err(RefitError::Stopped);
-    for (number, level) in levels.iter().enumerate().skip(from) {
-        if run.stopped() && number + 1 < levels.len() {
-            continue;
-        }
-        let on = match (level.mesh, &medium, &coarse) {
-            (Mesh::Medium, Some(medium), _) => medium,
-            (Mesh::Coarse, _, Some(coarse)) => coarse,
-            _ => prepared,
+    let mut last = None;
+    if initial.is_empty() {
+        let noted = checkpoint.take();
+        let search = |run: &mut Run<'_, '_>| {
+            let found = meshes.search(&levels, from..guided, (last, &[]), noted, run);
+            run.stage(FIRST_GUESS);
+            found
         };
-        let same = matches!(&last, Ok((mesh, _)) if *mesh == level.mesh);
-        let first = match &last {
-            Err(_) => from_target(on, flatten(on)),
-            Ok((_, found)) if same => Guess::at(found.x.clone(), found.zeta.clone()),
-            Ok((_, found)) if level.rate == 0.0 => let_down(on, found.zeta.clone()),
-            Ok((_, found)) => from_target(on, found.zeta.clone()),
-        };
-        let mut guesses = vec![first];
-        if level.rate == 0.0 {
-            let x = match level.mesh {
-                Mesh::Own => initial.clone(),
-                _ => resample(&prepared.garment.mesh, &initial, &on.garment.mesh),
-            };
-            guesses.push(Guess::at(x, on.initial()));
-        } else if number == 0 {
-            guesses.push(from_target(on, on.initial()));
-        } else if same {
-            // Not caught in what the last level was.
-            guesses.push(from_target(on, guesses[0].zeta.clone()));
-        }
-        run.stage(level.stage());
-        let keep = Keep {
-            params: prepared.params,
-            x_star: &prepared.x_star,
-            initial: &initial,
-            level: number,
-        };
-        let found = level.search(on, &guesses, checkpoint.take(), keep, &mut run)?;
-        let found = found.map_err(|failed| prepared.told(failed));
-        if found.is_ok() || number + 1 == levels.len() {
-            last = found.map(|found| (level.mesh, found));
-        }
+        let first = |run: &mut Run<'_, '_>| first_drape(prepared, guided > 0, run);
+        let (found, first) = run.both(&prepared.spare, search, first);
+        last = found?;
+        let (x, note) = first.map_err(|failed| prepared.told(failed))?;
+        run.begin_with(note);
+        initial = x;
     }
-    let (_, found) = last?;
+    let free = from.max(guided)..levels.len();
+    let last = meshes.search(&levels, free, (last, &initial), checkpoint, &mut run)?;
+    let (_, found) = last.ok_or(RefitError::Stopped)?;
     Ok(Found {
         x_bar: prepared.cages.deform(&found.zeta),
         x: found.x,
@@ -128,6 +118,70 @@ pub(super) fn searched(
         },
         iterations: run.notes(),
     })
+}
+
+impl Meshes<'_> {
+    fn levels(&self) -> Vec<Level> {
+        let gradient = self.own.params.descent.gradient;
+        levels(gradient, self.medium.is_some(), self.coarse.is_some())
+    }
+
+    /// Searches the `numbers` of all `levels` one after the other, the first of them on from a checkpoint. `before` is
+    /// what the last level before them found and the drape of the first guess, which guided levels do without.
+    fn search(
+        &self,
+        levels: &[Level],
+        numbers: Range<usize>,
+        before: (Option<(Mesh, Settled)>, &[Vec3]),
+        mut checkpoint: Option<Checkpoint>,
+        run: &mut Run<'_, '_>,
+    ) -> Result<Option<(Mesh, Settled)>, RefitError> {
+        let (mut last, initial) = before;
+        for number in numbers {
+            let (level, decides) = (levels[number], number + 1 == levels.len());
+            if run.stopped() && !decides {
+                continue;
+            }
+            let on = match (level.mesh, &self.medium, &self.coarse) {
+                (Mesh::Medium, Some(medium), _) => medium,
+                (Mesh::Coarse, _, Some(coarse)) => coarse,
+                _ => self.own,
+            };
+            let same = matches!(&last, Some((mesh, _)) if *mesh == level.mesh);
+            let first = match &last {
+                None => from_target(on, flatten(on)),
+                Some((_, found)) if same => Guess::at(found.x.clone(), found.zeta.clone()),
+                Some((_, found)) if level.rate == 0.0 => let_down(on, found.zeta.clone()),
+                Some((_, found)) => from_target(on, found.zeta.clone()),
+            };
+            let mut guesses = vec![first];
+            if level.rate == 0.0 {
+                let x = match level.mesh {
+                    Mesh::Own => initial.to_vec(),
+                    _ => resample(&self.own.garment.mesh, initial, &on.garment.mesh),
+                };
+                guesses.push(Guess::at(x, on.initial()));
+            } else if number == 0 {
+                guesses.push(from_target(on, on.initial()));
+            } else if same {
+                // Not caught in what the last level was.
+                guesses.push(from_target(on, guesses[0].zeta.clone()));
+            }
+            run.stage(level.stage());
+            let keep = Keep {
+                params: on.params,
+                x_star: &self.own.x_star,
+                initial,
+                level: number,
+            };
+            match level.search(on, &guesses, checkpoint.take(), keep, run)? {
+                Ok(found) => last = Some((level.mesh, found)),
+                Err(failed) if decides => return Err(self.own.told(failed)),
+                Err(_) => {}
+            }
+        }
+        Ok(last)
+    }
 }
 
 /// The levels of a refit. Time steps have no guides, as they have none in the paper.
@@ -150,18 +204,24 @@ fn levels(gradient: Gradient, medium: bool, coarse: bool) -> Vec<Level> {
     levels
 }
 
-/// The drape of the scaled reference in free cloth, almost at rest, noted as where the search begins.
-fn first_drape(prepared: &Prepared<'_>, run: &mut Run<'_, '_>) -> Result<Vec<Vec3>, RefitError> {
-    run.stage("first guess");
+/// The drape of the scaled reference in free cloth, almost at rest, with its note; what stops the search stops it
+/// only where there is nothing `to_keep` otherwise.
+fn first_drape(
+    prepared: &Prepared<'_>,
+    to_keep: bool,
+    run: &mut Run<'_, '_>,
+) -> Result<(Vec<Vec3>, Iteration), Failed> {
     let scene = prepared.scene();
     let sim = almost(&scene);
     let scene = Scene {
         params: &sim,
         ..scene
     };
+    if to_keep {
+        run.never_stop();
+    }
     let first = from_target(prepared, prepared.initial());
-    let first = prepared.search(&scene).first(first, run);
-    first.map_err(|failed| prepared.told(failed))
+    prepared.search(&scene).first(first, run)
 }
 
 /// A pattern, and its cloth let down from the target shape by guides that give way one after the other: so it

@@ -18,7 +18,7 @@ use crate::descent::{Damping, DescentParams, Optimizer};
 use crate::geometry::{Vec2, Vec3};
 use crate::loss::Losses;
 use crate::pattern::PatternMesh;
-use crate::report::Ending;
+use crate::report::{Ending, Iteration};
 use crate::sim::Scene;
 use crate::sim::energy::contact::Surface;
 use aside::Spare;
@@ -217,16 +217,16 @@ impl<'s, S: Surface> Search<'s, S> {
         Some(self.go_on(going, run))
     }
 
-    /// A guess, draped and noted: where it lies \[m\].
+    /// A guess, draped: where it lies \[m\], and its note as the first of all.
     pub(super) fn first(
         &self,
         guess: Guess<'_>,
         run: &mut Run<'_, '_>,
-    ) -> Result<Vec<Vec3>, Failed> {
+    ) -> Result<(Vec<Vec3>, Iteration), Failed> {
         let start = (guess.start)(run);
         let first = self.accept(self.candidate(guess.zeta, start, run)?)?;
-        run.note(self, &first, 0.0);
-        Ok(first.x)
+        let note = run.noted(0, self, &first, 0.0);
+        Ok((first.x, note))
     }
 
     /// Steps until there is a reason to stop.
@@ -310,8 +310,8 @@ impl<'s, S: Surface> Search<'s, S> {
         Some(after(step))
     }
 
-    /// Where the drape goes to first order, if that is known and near enough to be believed; else
-    /// where it is.
+    /// Where the drape goes to first order and through nothing, if that is known and near enough to be
+    /// believed; else where it is. A drape does not feel what goes through itself where it starts.
     fn predict(&self, best: &Point<'_>, step: &DVector<f64>) -> Vec<Vec3> {
         let x = &best.x;
         let Some(state) = &best.state else {
@@ -324,15 +324,13 @@ impl<'s, S: Surface> Search<'s, S> {
             }
         }
         let moves = state.sensitivities(std::iter::once(motion));
-        let moved = x.iter().zip(moves.chunks_exact(3));
-        let moved: Vec<Vec3> = moved
-            .map(|(p, d)| p + Vec3::new(d[0], d[1], d[2]))
-            .collect();
-        let far = moved
-            .iter()
-            .zip(x)
-            .any(|(a, b)| !((a - b).norm() < FARTHEST_PREDICTION));
-        if far { x.clone() } else { moved }
+        let moves = moves.chunks_exact(3).map(Vec3::from_column_slice);
+        let mut moves: Vec<Vec3> = moves.collect();
+        if moves.iter().any(|d| !(d.norm() < FARTHEST_PREDICTION)) {
+            return x.clone();
+        }
+        state.hold_apart(&mut moves);
+        x.iter().zip(moves).map(|(p, d)| p + d).collect()
     }
 }
 

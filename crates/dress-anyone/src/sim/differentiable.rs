@@ -6,7 +6,7 @@ use super::drape::{Drape, Scene, system};
 use super::energy::contact::Surface;
 use super::energy::friction::Grip;
 use super::equilibrium::{EquilibriumParams, RestStatus, Touch};
-use super::layers::{Layers, hold_apart};
+use super::layers::Layers;
 use super::system::System;
 use crate::body::DistanceField;
 use crate::garment::Fabric;
@@ -73,8 +73,7 @@ impl Drape {
             for d in &mut kick {
                 *d *= KICK;
             }
-            let near = self.layers.pairs(&self.x, &kick, 0.0);
-            hold_apart(&near, &self.x, &mut kick, 0.0);
+            self.layers.hold_apart(&self.x, &mut kick);
             for (x, d) in self.x.iter_mut().zip(kick) {
                 *x += d;
             }
@@ -240,6 +239,11 @@ impl Differentiable<'_> {
             Stiffness::General(factor) => factor.solve_columns(&mut columns),
         }
         columns
+    }
+
+    /// Shortens moves of the cloth from here \[m\], `[vertex]`, so that no layer passes through another.
+    pub fn hold_apart(&self, moves: &mut [Vec3]) {
+        self.drape.layers.clone().hold_apart(&self.drape.x, moves);
     }
 
     /// Friction of each contact point; none without friction.

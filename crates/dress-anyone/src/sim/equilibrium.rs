@@ -12,7 +12,7 @@ mod slide;
 use super::cloth::Cloth;
 use super::energy::contact::Surface;
 use super::energy::layers::Pair;
-use super::layers::{Layers, hold_apart};
+use super::layers::Layers;
 use super::system::{Assembly, System};
 use crate::geometry::Vec3;
 use crate::geometry::sparse::Workspace;
@@ -238,8 +238,7 @@ pub fn find<S: Surface>(
         for d in &mut direction {
             *d *= scale;
         }
-        let near = layers.pairs(&state.x, &direction, 0.0);
-        hold_apart(&near, &state.x, &mut direction, 0.0);
+        let near = layers.hold_apart(&state.x, &mut direction);
         let found = line_search(system, layers, &state, &direction, &near, params);
         let Some((next, fraction)) = found else {
             if sigma < MOST_SIGMA {
@@ -355,8 +354,7 @@ impl State {
             &mut |_, _, _| true,
         );
         let mut direction = patch.moves(&self.x, &found.x);
-        let pairs = layers.pairs(&self.x, &direction, 0.0);
-        hold_apart(&pairs, &self.x, &mut direction, 0.0);
+        let pairs = layers.hold_apart(&self.x, &mut direction);
         Some(Self::at(system, moved(&self.x, &direction, 1.0), pairs))
     }
 }

@@ -16,7 +16,7 @@ use super::cloth::Cloth;
 use super::energy::layers::{Kind, LEAST_THICKNESS, LayerParams, Pair};
 use crate::geometry::box_tree::{Aabb, BoxTree, around};
 use crate::geometry::{Vec3, intersections};
-pub use hold_apart::hold_apart;
+use hold_apart::hold_apart;
 use std::collections::BTreeMap;
 pub use stepping::Watch;
 
@@ -187,6 +187,14 @@ impl Layers {
         }
         let pairs = self.near.pairs.iter().copied();
         pairs.filter(|p| comes_within(p, x, &d, reach)).collect()
+    }
+
+    /// Shortens the move `d` from `x` \[m\] of single vertices, so that no layer passes through another; all
+    /// pairs that come closer than the thickness on the way.
+    pub fn hold_apart(&mut self, x: &[Vec3], d: &mut [Vec3]) -> Vec<Pair> {
+        let pairs = self.pairs(x, d, 0.0);
+        hold_apart(&pairs, x, d, 0.0);
+        pairs
     }
 
     /// The most room that it pays to search with \[m\]: beyond, every piece would meet its

@@ -2,7 +2,7 @@
 //! before it is refused. What comes of it is what one after the other gives, bit for bit; only the clock tells.
 
 use super::Run;
-use crate::refit::{Clock, Progress};
+use crate::refit::Progress;
 use crate::sim::drape::DrapeProgress;
 use std::panic::resume_unwind;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -65,6 +65,19 @@ impl Drop for Core<'_> {
 }
 
 impl Run<'_, '_> {
+    /// Does `first` and, beside it or after it if there is no core to spare, `second`, whose notes count what it took
+    /// alone.
+    pub(in crate::refit) fn both<A, B: Send>(
+        &mut self,
+        spare: &Spare,
+        first: impl FnOnce(&mut Self) -> A,
+        second: impl Fn(&mut Run<'_, '_>) -> B + Sync,
+    ) -> (A, B) {
+        let (found, made) = self.beside(spare, first, Some(&second), |_| false);
+        let made = made.unwrap_or_else(|| self.apart(second));
+        (found, self.count_made(made))
+    }
+
     /// Does `first` and, if there is a core to spare, `second` beside it, which is stopped once `first` is `enough`.
     /// None of `second` if there was none or `first` is enough.
     pub(super) fn beside<A, B: Send>(
@@ -74,18 +87,19 @@ impl Run<'_, '_> {
         second: Option<impl FnOnce(&mut Run<'_, '_>) -> B + Send>,
         enough: impl FnOnce(&A) -> bool,
     ) -> (A, Option<Made<B>>) {
-        let Some((second, _core)) = second.and_then(|second| Some((second, spare.take()?))) else {
+        let Some((second, core)) = second.and_then(|second| Some((second, spare.take()?))) else {
             return (first(self), None);
         };
-        let (stop, latest) = (AtomicBool::new(false), Mutex::new(None));
-        let work = || {
+        let (stop, latest) = (&AtomicBool::new(false), &Mutex::new(None));
+        let mut clock = self.clock.same_start();
+        let work = move || {
+            let _until_done = core;
             let mut observe = |progress: &Progress| {
                 if let Progress::Drape(progress) = progress {
                     *latest.lock().unwrap_or_else(PoisonError::into_inner) = Some(*progress);
                 }
                 !stop.load(Ordering::Relaxed)
             };
-            let mut clock = Clock::new();
             let mut run = Run::new(&mut clock, &mut observe);
             let found = second(&mut run);
             run.made(found)
@@ -112,6 +126,7 @@ impl Run<'_, '_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::refit::Clock;
 
     fn with_run<T>(work: impl FnOnce(&mut Run<'_, '_>) -> T) -> T {
         let mut clock = Clock::new();

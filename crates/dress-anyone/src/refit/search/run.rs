@@ -14,9 +14,11 @@ pub(in crate::refit) struct Run<'a, 'b> {
     notes: Vec<Iteration>,
     drapes: usize,
     factorisations: usize,
-    clock: &'a mut Clock,
+    pub(super) clock: &'a mut Clock,
     observe: &'a mut Observer<'b>,
     stopped: bool,
+    /// Whether drapes are draped to their end whatever the observer wants.
+    never_stops: bool,
 }
 
 impl<'a, 'b> Run<'a, 'b> {
@@ -29,6 +31,7 @@ impl<'a, 'b> Run<'a, 'b> {
             clock,
             observe,
             stopped: false,
+            never_stops: false,
         }
     }
 
@@ -37,6 +40,11 @@ impl<'a, 'b> Run<'a, 'b> {
         self.notes.clone_from(&from.notes);
         self.drapes = from.drapes;
         self.factorisations = from.factorisations;
+    }
+
+    /// What is draped from now on is draped to its end, whatever the observer wants.
+    pub(in crate::refit) fn never_stop(&mut self) {
+        self.never_stops = true;
     }
 
     /// Another stage begins.
@@ -70,6 +78,16 @@ impl<'a, 'b> Run<'a, 'b> {
         self.count_factorisations(drape.iterations);
     }
 
+    /// Does `work` as a run of its own.
+    pub(super) fn apart<T>(&mut self, work: impl FnOnce(&mut Run<'_, '_>) -> T) -> Made<T> {
+        let mut run = Run::new(self.clock, self.observe);
+        run.stopped = self.stopped;
+        let found = work(&mut run);
+        let made = run.made(found);
+        self.stopped = run.stopped;
+        made
+    }
+
     /// Gives what was found aside, with what it took.
     pub(super) fn made<T>(&self, found: T) -> Made<T> {
         Made {
@@ -89,13 +107,32 @@ impl<'a, 'b> Run<'a, 'b> {
     /// Tells how a drape proceeds; whether to go on with it. Once stopped, what is left to drape is
     /// draped to its end.
     pub(in crate::refit) fn drapes(&mut self, progress: DrapeProgress) -> bool {
-        self.tell(&Progress::Drape(progress))
+        self.tell(&Progress::Drape(progress)) || self.never_stops
     }
 
-    /// Notes an accepted point, and tells it.
+    /// Notes an accepted point, and tells it. Number 0 is the first guess, which has its own note.
     pub(super) fn note<S>(&mut self, search: &Search<'_, S>, best: &Point<'_>, moved: f64) {
-        let iteration = self.notes.len();
-        self.notes.push(Iteration {
+        let iteration = self.notes.last().map_or(1, |last| last.iteration + 1);
+        let note = self.noted(iteration, search, best, moved);
+        self.tell_of(&note);
+        self.notes.push(note);
+    }
+
+    /// Puts the note of the first guess before all others, and tells it.
+    pub(in crate::refit) fn begin_with(&mut self, note: Iteration) {
+        self.tell_of(&note);
+        self.notes.insert(0, note);
+    }
+
+    /// The note of a point, as things stand.
+    pub(super) fn noted<S>(
+        &self,
+        iteration: usize,
+        search: &Search<'_, S>,
+        best: &Point<'_>,
+        moved: f64,
+    ) -> Iteration {
+        Iteration {
             iteration,
             guide: search.guide,
             loss: best.total,
@@ -109,11 +146,14 @@ impl<'a, 'b> Run<'a, 'b> {
             drapes: self.drapes,
             factorisations: self.factorisations,
             elapsed: self.clock.elapsed(),
-        });
+        }
+    }
+
+    fn tell_of(&mut self, note: &Iteration) {
         self.tell(&Progress::Iteration {
-            iteration,
-            loss: best.total,
-            terms: best.loss.terms,
+            iteration: note.iteration,
+            loss: note.loss,
+            terms: note.terms,
         });
     }
 

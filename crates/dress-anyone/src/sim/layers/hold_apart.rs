@@ -18,7 +18,7 @@ const MOVING_PASSES: usize = 3;
 ///
 /// The parting planes move along with the mean of their pair, so that layers fall together. Where
 /// that does not work out, because a vertex is held back elsewhere, planes stand still in the end.
-pub fn hold_apart(pairs: &[Pair], x: &[Vec3], d: &mut [Vec3], least: f64) -> bool {
+pub(super) fn hold_apart(pairs: &[Pair], x: &[Vec3], d: &mut [Vec3], least: f64) -> bool {
     let mean = d.iter().sum::<Vec3>() / d.len() as f64;
     let mut own = without_mean(d);
     let shortened = hold_own_moves_apart(pairs, x, &mut own, least);
