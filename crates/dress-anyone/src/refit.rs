@@ -27,6 +27,7 @@ use crate::pattern::Pattern;
 use crate::problem::Problem;
 use crate::report::{Ending, Report, StageTime};
 use crate::sim::drape::DrapeProgress;
+use crate::sim::energy::friction::Grip;
 use crate::sim::equilibrium::RestStatus;
 use crate::sim::{Cloth, SimParams, Start, drape};
 use crate::transfer::{TransferError, TransferParams};
@@ -257,13 +258,11 @@ pub fn refit_from(
     // The pattern as it will be cut: curves within the tolerance, and the drape of just that.
     clock.stage("pattern as written", observe);
     let written = written::write(garment, &found.x_bar, params.outline_tolerance);
-    let last = drape(
-        &scene,
-        &written.x_bar,
-        found.x.clone(),
-        Start::Near,
-        &mut |_, _| true,
-    );
+    let start = written::predicted(&scene, &found, &written);
+    let last = drape(&scene, &written.x_bar, start, Start::Near, &mut |p, _| {
+        observe(&Progress::Drape(p));
+        true
+    });
     let last = if found.ending == Ending::Interrupted {
         last
     } else {
@@ -381,6 +380,7 @@ impl Clock {
 pub(crate) struct Found {
     x_bar: Vec<Vec2>,
     x: Vec<Vec3>,
+    grips: Vec<Grip>,
     initial: Vec<Vec3>,
     ending: Ending,
     iterations: Vec<crate::report::Iteration>,

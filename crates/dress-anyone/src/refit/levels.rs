@@ -110,6 +110,7 @@ pub(super) fn searched(
     Ok(Found {
         x_bar: prepared.cages.deform(&found.zeta),
         x: found.x,
+        grips: found.grips,
         initial,
         ending: if run.stopped() {
             Ending::Interrupted

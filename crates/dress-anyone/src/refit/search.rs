@@ -21,6 +21,7 @@ use crate::pattern::PatternMesh;
 use crate::report::{Ending, Iteration};
 use crate::sim::Scene;
 use crate::sim::energy::contact::Surface;
+use crate::sim::energy::friction::Grip;
 use aside::Spare;
 use guards::{farthest, quality_floor};
 use nalgebra::DVector;
@@ -30,8 +31,6 @@ use serde::{Deserialize, Serialize};
 use std::cell::OnceCell;
 use std::sync::mpsc;
 
-/// Predicted moves of the cloth beyond this are not trusted as a start \[m\].
-const FARTHEST_PREDICTION: f64 = 0.03;
 /// No triangle may fall below this part of the reference pattern's poorest.
 const LEAST_QUALITY: f64 = 0.82;
 /// A refused step is tried again only while it moves the pattern farther than this \[m\].
@@ -78,6 +77,8 @@ pub(super) struct Settled {
     pub(super) zeta: Vec<f64>,
     /// \[m\].
     pub(super) x: Vec<Vec3>,
+    /// Friction there; none without.
+    pub(super) grips: Vec<Grip>,
     pub(super) ending: Ending,
 }
 
@@ -263,6 +264,7 @@ impl<'s, S: Surface> Search<'s, S> {
             run.note(self, &going.best, far);
         };
         Settled {
+            grips: going.best.grips(),
             zeta: going.best.zeta,
             x: going.best.x,
             ending,
@@ -310,27 +312,18 @@ impl<'s, S: Surface> Search<'s, S> {
         Some(after(step))
     }
 
-    /// Where the drape goes to first order and through nothing, if that is known and near enough to be
-    /// believed; else where it is. A drape does not feel what goes through itself where it starts.
+    /// Where the drape goes to first order, if that is known and near enough to be believed; else where it
+    /// is.
     fn predict(&self, best: &Point<'_>, step: &DVector<f64>) -> Vec<Vec3> {
-        let x = &best.x;
-        let Some(state) = &best.state else {
-            return x.clone();
-        };
         let mut motion = vec![Vec2::zeros(); self.mesh.x_bar.len()];
         for (by, d) in self.motions.iter().zip(step.iter()) {
             for (sum, by) in motion.iter_mut().zip(by) {
                 *sum += by * *d;
             }
         }
-        let moves = state.sensitivities(std::iter::once(motion));
-        let moves = moves.chunks_exact(3).map(Vec3::from_column_slice);
-        let mut moves: Vec<Vec3> = moves.collect();
-        if moves.iter().any(|d| !(d.norm() < FARTHEST_PREDICTION)) {
-            return x.clone();
-        }
-        state.hold_apart(&mut moves);
-        x.iter().zip(moves).map(|(p, d)| p + d).collect()
+        let state = best.state.as_ref();
+        let predicted = state.and_then(|state| state.predicted(motion));
+        predicted.unwrap_or_else(|| best.x.clone())
     }
 }
 
@@ -344,7 +337,7 @@ impl Going<'_> {
             level: keep.level,
             zeta: best.zeta.clone(),
             x: best.x.clone(),
-            grips: (best.state.as_ref()).map_or_else(Vec::new, |state| state.grips().to_vec()),
+            grips: best.grips(),
             gradient: best.gradient.clone(),
             adjoint_norm: best.adjoint_norm,
             residual: best.residual,

@@ -35,6 +35,8 @@ enum Stiffness {
 /// modes of a garment (a pendulum of 1 m has g/l ≈ 10).
 const FIRST_SHIFT: f64 = 1e-3;
 
+/// Predicted moves of the cloth beyond this are not trusted as a start \[m\].
+const FARTHEST_PREDICTION: f64 = 0.03;
 /// Residual above which indefinite stiffness tells of no saddle, for the state is not at rest \[–\].
 const SADDLE_BELOW: f64 = 1e-3;
 /// Kicks off saddles before the stiffness is shifted instead.
@@ -241,9 +243,19 @@ impl Differentiable<'_> {
         columns
     }
 
-    /// Shortens moves of the cloth from here \[m\], `[vertex]`, so that no layer passes through another.
-    pub fn hold_apart(&self, moves: &mut [Vec3]) {
-        self.drape.layers.clone().hold_apart(&self.drape.x, moves);
+    /// Where the cloth goes \[m\] to first order and through nothing as the rest shape moves by `motion` \[m\],
+    /// `[pattern vertex]`: a drape does not feel what goes through itself where it starts. None where that is too far
+    /// to be believed.
+    pub fn predicted(&self, motion: Vec<Vec2>) -> Option<Vec<Vec3>> {
+        let moves = self.sensitivities(std::iter::once(motion));
+        let moves = moves.chunks_exact(3).map(Vec3::from_column_slice);
+        let mut moves: Vec<Vec3> = moves.collect();
+        if moves.iter().any(|d| !(d.norm() < FARTHEST_PREDICTION)) {
+            return None;
+        }
+        let x = &self.drape.x;
+        self.drape.layers.clone().hold_apart(x, &mut moves);
+        Some(x.iter().zip(moves).map(|(p, d)| p + d).collect())
     }
 
     /// Friction of each contact point; none without friction.

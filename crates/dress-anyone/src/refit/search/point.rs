@@ -10,6 +10,7 @@ use crate::sim::broken::Broken;
 use crate::sim::differentiable::{Differentiable, differentiable_at};
 use crate::sim::drape::DrapeProgress;
 use crate::sim::energy::contact::Surface;
+use crate::sim::energy::friction::Grip;
 use crate::sim::equilibrium::RestStatus;
 use crate::sim::{Start, Trajectory, drape};
 use nalgebra::DVector;
@@ -69,6 +70,13 @@ pub(in crate::refit) struct Point<'a> {
     pub(super) shift: f64,
     /// The state of rest; none with time steps, whose way is forgotten.
     pub(super) state: Option<Box<Differentiable<'a>>>,
+}
+
+impl Point<'_> {
+    /// Friction there; none without.
+    pub(super) fn grips(&self) -> Vec<Grip> {
+        (self.state.as_ref()).map_or_else(Vec::new, |state| state.grips().to_vec())
+    }
 }
 
 impl Failed {
