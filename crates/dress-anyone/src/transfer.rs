@@ -141,7 +141,8 @@ pub fn target_shape(
     params: &TransferParams,
 ) -> Result<Target, TransferError> {
     check(drape, &layout.triangles, source, target)?;
-    let skins = [source, target].map(Skin::of);
+    let skins = rayon::join(|| Skin::of(source), || Skin::of(target));
+    let skins = <[Skin; 2]>::from(skins);
     let rings = rings(drape.len(), &layout.triangles);
     let cloth = (layout, &rings[..]);
     let mut there = Way::new((drape, Vec3::y()), cloth, [&skins[0], &skins[1]], params);
