@@ -263,3 +263,64 @@ impl Differentiable<'_> {
         &self.drape.grips
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::garment::Fabric;
+    use crate::geometry::intersections;
+    use crate::sim::cloth::fixtures;
+    use crate::sim::energy::contact::Nothing;
+    use crate::sim::{Assembly, SimParams};
+
+    #[test]
+    fn what_is_predicted_goes_through_nothing_and_not_too_far() {
+        // A sheet that stands 3 mm above one that lies, both of 12 cm and in soft springs.
+        let one = fixtures::sheet(6, 6, 0.02);
+        let (mesh, count) = (fixtures::twice(&one), one.x_bar.len());
+        let place = |i: usize| {
+            let p = one.x_bar[i % count];
+            if i < count {
+                Vec3::new(p.x, 0.0, p.y)
+            } else {
+                Vec3::new(p.x, p.y + 3e-3, 0.053)
+            }
+        };
+        let x: Vec<Vec3> = (0..2 * count).map(place).collect();
+        let cloth = Cloth::new(&mesh, &Fabric::default()).guided(x.clone(), 100.0);
+        let (assembly, params) = (Assembly::new(&cloth), SimParams::default());
+        let scene = Scene {
+            cloth: &cloth,
+            assembly: &assembly,
+            surface: &Nothing,
+            params: &params,
+        };
+        let state = differentiable_at(&scene, &mesh.x_bar, x.clone(), Vec::new());
+        let state = state.expect("springs hold it");
+        let told = [0.002, 0.02, 0.5].map(|growth| {
+            // About its middle, which lies still.
+            let grown = |(i, p): (usize, &Vec2)| {
+                let part = if i < count { 0.0 } else { growth };
+                (p - Vec2::repeat(0.06)) * part
+            };
+            let motion: Vec<Vec2> = mesh.x_bar.iter().enumerate().map(grown).collect();
+            let moves = state.sensitivities(std::iter::once(motion.clone()));
+            let moves = moves.chunks_exact(3).map(Vec3::from_column_slice);
+            let linear: Vec<Vec3> = x.iter().zip(moves).map(|(x, d)| x + d).collect();
+            let meets = |x: &[Vec3]| !intersections::within(x, &cloth.triangles).is_empty();
+            let predicted = state.predicted(motion);
+            let as_linear = predicted.as_ref().map(|x| *x == linear);
+            (
+                meets(&linear),
+                as_linear,
+                predicted.is_some_and(|x| meets(&x)),
+            )
+        });
+        let (short, through, far) = (
+            (false, Some(true), false),
+            (true, Some(false), false),
+            (true, None, false),
+        );
+        assert_eq!(told, [short, through, far]);
+    }
+}

@@ -159,6 +159,23 @@ mod tests {
     }
 
     #[test]
+    fn what_counts_for_itself_counts_alike_beside_other_work_and_after_it() {
+        let second = |run: &mut Run<'_, '_>| {
+            run.count_drape();
+            run.made(()).drapes
+        };
+        for cores in [0, 1] {
+            let spare = Spare(Arc::new(AtomicUsize::new(cores)));
+            with_run(|run| {
+                let first = |run: &mut Run<'_, '_>| run.count_drape();
+                let ((), own) = run.both(&spare, first, second);
+                assert_eq!((own, run.made(()).drapes), (1, 2), "{cores} cores");
+            });
+            assert_eq!(spare.0.load(Ordering::Relaxed), cores);
+        }
+    }
+
+    #[test]
     fn work_aside_is_stopped_once_it_is_not_wanted() {
         let settling = DrapeProgress::Settling {
             iteration: 0,
