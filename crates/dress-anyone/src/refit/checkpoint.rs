@@ -19,7 +19,7 @@ pub struct Checkpoint {
     pub(super) params: RefitParams,
     /// The target shape \[m\], which follows from garment and bodies.
     pub(super) x_star: Vec<Vec3>,
-    /// The drape of the initial guess \[m\]; none in levels that do without it.
+    /// The drape of the initial guess \[m\]; none in guided levels, which do without it.
     pub(super) initial: Vec<Vec3>,
     /// The level of the search that it is of, with the mesh of that level.
     pub(super) level: usize,
@@ -53,12 +53,18 @@ impl Checkpoint {
         self.notes.last().map_or(0, |last| last.iteration)
     }
 
-    /// Whether it is of this refit, which has so many levels: same parameters, same target shape to the
-    /// last bit. Whether it fits its level is for the search there to see.
-    pub(super) fn is_of(&self, params: &RefitParams, x_star: &[Vec3], levels: usize) -> bool {
+    /// Whether it is of this refit, which has so many `levels`, the first of them `guided`: same parameters, same
+    /// target shape to the last bit. Whether it fits its level is for the search there to see.
+    pub(super) fn is_of(
+        &self,
+        params: &RefitParams,
+        x_star: &[Vec3],
+        [guided, levels]: [usize; 2],
+    ) -> bool {
+        let first_guess = if self.level < guided { 0 } else { x_star.len() };
         self.params == *params
             && self.x_star == x_star
-            && [0, x_star.len()].contains(&self.initial.len())
+            && self.initial.len() == first_guess
             && self.level < levels
             && !self.notes.is_empty()
     }

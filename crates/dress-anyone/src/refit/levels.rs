@@ -83,7 +83,7 @@ pub(super) fn searched(
     let mut run = Run::new(clock, observe);
     let (from, mut initial) = match &checkpoint {
         None => (0, Vec::new()),
-        Some(noted) if noted.is_of(params, &prepared.x_star, levels.len()) => {
+        Some(noted) if noted.is_of(params, &prepared.x_star, [guided, levels.len()]) => {
             run.take_up(noted);
             (noted.level, noted.initial.clone())
         }
