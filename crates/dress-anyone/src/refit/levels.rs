@@ -21,8 +21,6 @@ use crate::report::{Ending, Iteration};
 use crate::sim::{Scene, SimParams, Start, drape};
 use std::ops::Range;
 
-/// The stage in which the first guess is waited for.
-const FIRST_GUESS: &str = "first guess";
 /// Rates of the guides \[1/s²\]: weight stretches them by 1 and 10 cm.
 const RATES: [f64; 2] = [1000.0, 100.0];
 /// Rates by which the cloth of a pattern found in a coarser mesh is let down \[1/s²\].
@@ -78,7 +76,11 @@ pub(super) fn searched(
         medium: medium?,
         coarse: coarse?,
     };
-    let levels = meshes.levels();
+    let levels = levels(
+        params.descent.gradient,
+        meshes.medium.is_some(),
+        meshes.coarse.is_some(),
+    );
     let guided = levels.iter().filter(|level| level.rate > 0.0).count();
     let mut run = Run::new(clock, observe);
     let (from, mut initial) = match &checkpoint {
@@ -94,7 +96,8 @@ pub(super) fn searched(
         let noted = checkpoint.take();
         let search = |run: &mut Run<'_, '_>| {
             let found = meshes.search(&levels, from..guided, (last, &[]), noted, run);
-            run.stage(FIRST_GUESS);
+            // What is left of it is waited for.
+            run.stage("first guess");
             found
         };
         let first = |run: &mut Run<'_, '_>| first_drape(prepared, guided > 0, run);
@@ -122,11 +125,6 @@ pub(super) fn searched(
 }
 
 impl Meshes<'_> {
-    fn levels(&self) -> Vec<Level> {
-        let gradient = self.own.params.descent.gradient;
-        levels(gradient, self.medium.is_some(), self.coarse.is_some())
-    }
-
     /// Searches the `numbers` of all `levels` one after the other, the first of them on from a checkpoint. `before` is
     /// what the last level before them found and the drape of the first guess, which guided levels do without.
     fn search(

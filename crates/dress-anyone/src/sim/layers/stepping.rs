@@ -41,7 +41,7 @@ pub(super) const LEAST_GAP: f64 = 1e-2;
 /// Steps between looks for tangles.
 const LOOK: usize = 10;
 /// Farthest that a step pushes tangled layers back, in thicknesses. By half as much armpits go round in circles, now
-/// more and now less tangled; by twice as much they are pushed through what is next to them.
+/// more and now less tangled; by twice as much a hoody ended with cloth through cloth.
 const PUSH: f64 = 1.0;
 
 impl Watch {
