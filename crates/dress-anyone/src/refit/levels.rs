@@ -27,8 +27,9 @@ const RATES: [f64; 2] = [1000.0, 100.0];
 const LET_DOWN: [f64; 3] = [1000.0, 100.0, 10.0];
 /// Most Levenberg–Marquardt steps of a guided level; the next takes them up.
 const GUIDED_STEPS: usize = 4;
-/// Residual at which guided cloth is at rest \[–\].
-const GUIDED_REST: f64 = 1e-2;
+/// Residual at which cloth is at rest for the search \[–\]. The pattern found is draped to its end in any case; on the
+/// way there steps go into the many small folds that the loss hardly feels.
+const SEARCH_REST: f64 = 1e-2;
 /// Falls of the loss not worth another step in guided cloth \[–\].
 const GUIDED_TOLERANCE: f64 = 1e-2;
 
@@ -287,10 +288,10 @@ impl Level {
         let free = on.scene();
         let mut cloth = free.cloth.clone();
         let mut sim = *free.params;
+        let rest = &mut sim.equilibrium;
+        rest.tolerance = rest.tolerance.max(SEARCH_REST);
+        rest.polished = rest.polished.max(SEARCH_REST);
         if self.rate > 0.0 {
-            let rest = &mut sim.equilibrium;
-            rest.tolerance = rest.tolerance.max(GUIDED_REST);
-            rest.polished = rest.polished.max(GUIDED_REST);
             cloth = cloth.guided(on.x_star.clone(), self.rate);
             params.tolerance = params.tolerance.max(GUIDED_TOLERANCE);
             if params.optimizer == Optimizer::Lm {
