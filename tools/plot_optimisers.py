@@ -37,8 +37,8 @@ def main():
 def draw(panel, label, folder, colour):
     report = json.loads((folder / "report.json").read_text())
     stages = report["stages"]
-    names = [stage["stage"] for stage in stages]
-    before = sum(stage["seconds"] for stage in stages[: names.index("first guess")])
+    searches = [stage["stage"] == "first guess" or "search" in stage["stage"] for stage in stages]
+    before = sum(stage["seconds"] for stage in stages[: searches.index(True)])
     points = [(i["elapsed"] - before, i["loss"], i["guide"]) for i in report["iterations"]]
     # One piece for each level; only the last of the free ones is the search's.
     pieces = [[points[0]]]

@@ -13,18 +13,18 @@ use super::prepare::Prepared;
 use super::search::point::{ALMOST_AT_REST, Failed};
 use super::search::{Guess, Run, Search, Settled};
 use super::{Clock, Found, Observer, RefitError};
-use crate::body::DistanceField;
 use crate::descent::{Gradient, Optimizer};
 use crate::geometry::Vec3;
 use crate::pattern::resample::resample;
 use crate::report::{Ending, Iteration};
-use crate::sim::{Scene, SimParams, Start, drape};
+use crate::sim::{Scene, Start, drape};
 use std::ops::Range;
 
 /// Rates of the guides \[1/s²\]: weight stretches them by 1 and 10 cm.
 const RATES: [f64; 2] = [1000.0, 100.0];
-/// Rates by which the cloth of a pattern found in a coarser mesh is let down \[1/s²\].
-const LET_DOWN: [f64; 3] = [1000.0, 100.0, 10.0];
+/// Residual down to which the cloth of a pattern found in a coarser mesh is eased about the target shape \[–\]: what
+/// the other mesh strains is gone then, and folds are where they were.
+const EASED: f64 = 10.0;
 /// Most Levenberg–Marquardt steps of a guided level; the next takes them up.
 const GUIDED_STEPS: usize = 4;
 /// Residual at which cloth is at rest for the search \[–\]. The pattern found is draped to its end in any case; on the
@@ -151,7 +151,7 @@ impl Meshes<'_> {
             let first = match &last {
                 None => from_target(on, flatten(on)),
                 Some((_, found)) if same => Guess::at(found.x.clone(), found.zeta.clone()),
-                Some((_, found)) if level.rate == 0.0 => let_down(on, found.zeta.clone()),
+                Some((_, found)) if level.rate == 0.0 => eased(on, found.zeta.clone()),
                 Some((_, found)) => from_target(on, found.zeta.clone()),
             };
             let mut guesses = vec![first];
@@ -212,7 +212,10 @@ fn first_drape(
     run: &mut Run<'_, '_>,
 ) -> Result<(Vec<Vec3>, Iteration), Failed> {
     let scene = prepared.scene();
-    let sim = almost(&scene);
+    let mut sim = *scene.params;
+    let rest = &mut sim.equilibrium;
+    rest.tolerance = rest.tolerance.max(ALMOST_AT_REST);
+    rest.polished = rest.polished.max(ALMOST_AT_REST);
     let scene = Scene {
         params: &sim,
         ..scene
@@ -224,39 +227,30 @@ fn first_drape(
     prepared.search(&scene).first(first, run)
 }
 
-/// A pattern, and its cloth let down from the target shape by guides that give way one after the other: so it
-/// keeps the folds of the target shape where it can.
-fn let_down<'a>(on: &'a Prepared<'_>, zeta: Vec<f64>) -> Guess<'a> {
+/// A pattern, and its cloth eased about the target shape, where guides hold it: so it keeps the folds of the target
+/// shape where it can.
+fn eased<'a>(on: &'a Prepared<'_>, zeta: Vec<f64>) -> Guess<'a> {
     let x_bar = on.cages.deform(&zeta);
     let start = move |run: &mut Run<'_, '_>| {
-        LET_DOWN.into_iter().fold(on.x_star.clone(), |x, rate| {
-            let free = on.scene();
-            let cloth = free.cloth.clone().guided(on.x_star.clone(), rate);
-            let mut sim = almost(&free);
-            sim.equilibrium.iterations = on.params.descent.patience;
-            let scene = Scene {
-                cloth: &cloth,
-                params: &sim,
-                ..free
-            };
-            let found = drape(&scene, &x_bar, x, Start::Near, &mut |p, _| run.drapes(p));
-            run.count(&found);
-            found.x
-        })
+        let free = on.scene();
+        let cloth = free.cloth.clone().guided(on.x_star.clone(), RATES[0]);
+        let mut sim = *free.params;
+        sim.equilibrium.tolerance = EASED;
+        sim.equilibrium.iterations = on.params.descent.patience;
+        let scene = Scene {
+            cloth: &cloth,
+            params: &sim,
+            ..free
+        };
+        let from = on.x_star.clone();
+        let found = drape(&scene, &x_bar, from, Start::Near, &mut |p, _| run.drapes(p));
+        run.count(&found);
+        found.x
     };
     Guess {
         zeta,
         start: Box::new(start),
     }
-}
-
-/// A scene's parameters with drapes that end when they are almost at rest.
-fn almost(scene: &Scene<'_, DistanceField>) -> SimParams {
-    let mut sim = *scene.params;
-    let rest = &mut sim.equilibrium;
-    rest.tolerance = rest.tolerance.max(ALMOST_AT_REST);
-    rest.polished = rest.polished.max(ALMOST_AT_REST);
-    sim
 }
 
 /// A pattern, to be draped from the target shape.
