@@ -13,7 +13,7 @@ use super::prepare::Prepared;
 use super::search::point::{ALMOST_AT_REST, Failed};
 use super::search::{Guess, Run, Search, Settled};
 use super::{Clock, Found, Observer, RefitError};
-use crate::descent::{Gradient, Optimizer};
+use crate::descent::{DescentParams, Gradient, Optimizer};
 use crate::geometry::Vec3;
 use crate::pattern::resample::resample;
 use crate::report::{Ending, Iteration};
@@ -27,9 +27,9 @@ const RATES: [f64; 2] = [1000.0, 100.0];
 const EASED: f64 = 10.0;
 /// Most Levenberg–Marquardt steps of a guided level; the next takes them up.
 const GUIDED_STEPS: usize = 4;
-/// Residual at which cloth is at rest for the search \[–\]. The pattern found is draped to its end in any case; on the
-/// way there steps go into the many small folds that the loss hardly feels.
-const SEARCH_REST: f64 = 1e-2;
+/// Residual at which drapes end before the last level \[–\]: what follows settles the many small folds, which the loss
+/// hardly feels.
+const NEARLY: f64 = 1e-2;
 /// Falls of the loss not worth another step in guided cloth \[–\].
 const GUIDED_TOLERANCE: f64 = 1e-2;
 
@@ -47,6 +47,8 @@ struct Level {
     mesh: Mesh,
     /// k \[1/s²\]; 0 in free cloth.
     rate: f64,
+    /// Residual at which a drape ends, if that is above what is asked for \[–\].
+    rest: f64,
 }
 
 /// The garment in the meshes that are searched.
@@ -78,7 +80,7 @@ pub(super) fn searched(
         coarse: coarse?,
     };
     let levels = levels(
-        params.descent.gradient,
+        &params.descent,
         meshes.medium.is_some(),
         meshes.coarse.is_some(),
     );
@@ -132,10 +134,10 @@ impl Meshes<'_> {
         &self,
         levels: &[Level],
         numbers: Range<usize>,
-        before: (Option<(Mesh, Settled)>, &[Vec3]),
+        before: (Option<(Level, Settled)>, &[Vec3]),
         mut checkpoint: Option<Checkpoint>,
         run: &mut Run<'_, '_>,
-    ) -> Result<Option<(Mesh, Settled)>, RefitError> {
+    ) -> Result<Option<(Level, Settled)>, RefitError> {
         let (mut last, initial) = before;
         for number in numbers {
             let (level, decides) = (levels[number], number + 1 == levels.len());
@@ -147,26 +149,29 @@ impl Meshes<'_> {
                 (Mesh::Coarse, _, Some(coarse)) => coarse,
                 _ => self.own,
             };
-            let same = matches!(&last, Some((mesh, _)) if *mesh == level.mesh);
+            let same = matches!(&last, Some((last, _)) if last.mesh == level.mesh);
+            let again = matches!(&last, Some((last, _)) if same && last.rate == level.rate);
             let first = match &last {
                 None => from_target(on, flatten(on)),
                 Some((_, found)) if same => Guess::at(found.x.clone(), found.zeta.clone()),
                 Some((_, found)) if level.rate == 0.0 => eased(on, found.zeta.clone()),
                 Some((_, found)) => from_target(on, found.zeta.clone()),
             };
-            let mut guesses = vec![first];
-            if level.rate == 0.0 {
+            let second = if again {
+                None
+            } else if level.rate == 0.0 {
                 let x = match level.mesh {
                     Mesh::Own => initial.to_vec(),
                     _ => resample(&self.own.garment.mesh, initial, &on.garment.mesh),
                 };
-                guesses.push(Guess::at(x, on.initial()));
+                Some(Guess::at(x, on.initial()))
             } else if number == 0 {
-                guesses.push(from_target(on, on.initial()));
-            } else if same {
+                Some(from_target(on, on.initial()))
+            } else {
                 // Not caught in what the last level was.
-                guesses.push(from_target(on, guesses[0].zeta.clone()));
-            }
+                same.then(|| from_target(on, first.zeta.clone()))
+            };
+            let guesses: Vec<Guess<'_>> = [Some(first), second].into_iter().flatten().collect();
             run.stage(level.stage());
             let keep = Keep {
                 params: on.params,
@@ -175,7 +180,7 @@ impl Meshes<'_> {
                 level: number,
             };
             match level.search(on, &guesses, checkpoint.take(), keep, run)? {
-                Ok(found) => last = Some((level.mesh, found)),
+                Ok(found) => last = Some((level, found)),
                 Err(failed) if decides => return Err(self.own.told(failed)),
                 Err(_) => {}
             }
@@ -184,21 +189,27 @@ impl Meshes<'_> {
     }
 }
 
-/// The levels of a refit. Time steps have no guides, as they have none in the paper.
-fn levels(gradient: Gradient, medium: bool, coarse: bool) -> Vec<Level> {
-    let at = |mesh, rate| Level { mesh, rate };
-    let last = at(Mesh::Own, 0.0);
-    if gradient == Gradient::Trajectory {
+/// The levels of a refit. Time steps have no guides, as they have none in the paper. Free cloth is as near to rest as is
+/// asked for in the last level, and wherever steps come from the gradient alone: so many small ones lead to states that
+/// are not of rest.
+fn levels(params: &DescentParams, medium: bool, coarse: bool) -> Vec<Level> {
+    let at = |mesh, rate, rest| Level { mesh, rate, rest };
+    let last = at(Mesh::Own, 0.0, 0.0);
+    if params.gradient == Gradient::Trajectory {
         return vec![last];
     }
     let mut levels = Vec::new();
     if coarse {
-        levels.push(at(Mesh::Coarse, RATES[0]));
+        levels.push(at(Mesh::Coarse, RATES[0], NEARLY));
     }
     let mesh = if medium { Mesh::Medium } else { Mesh::Own };
-    levels.extend(RATES.map(|rate| at(mesh, rate)));
+    levels.extend(RATES.map(|rate| at(mesh, rate, NEARLY)));
+    let newton = params.optimizer == Optimizer::Lm;
     if medium {
-        levels.push(at(Mesh::Medium, 0.0));
+        levels.push(at(Mesh::Medium, 0.0, if newton { NEARLY } else { 0.0 }));
+    }
+    if newton {
+        levels.push(at(Mesh::Own, 0.0, NEARLY));
     }
     levels.push(last);
     levels
@@ -261,6 +272,7 @@ fn from_target<'a>(on: &Prepared<'_>, zeta: Vec<f64>) -> Guess<'a> {
 impl Level {
     fn stage(self) -> &'static str {
         match (self.rate > 0.0, self.mesh == Mesh::Own) {
+            (false, true) if self.rest > 0.0 => "search, almost at rest",
             (false, true) => "search",
             (false, false) => "search, coarser mesh",
             (true, true) => "guided search",
@@ -283,8 +295,8 @@ impl Level {
         let mut cloth = free.cloth.clone();
         let mut sim = *free.params;
         let rest = &mut sim.equilibrium;
-        rest.tolerance = rest.tolerance.max(SEARCH_REST);
-        rest.polished = rest.polished.max(SEARCH_REST);
+        rest.tolerance = rest.tolerance.max(self.rest);
+        rest.polished = rest.polished.max(self.rest);
         if self.rate > 0.0 {
             cloth = cloth.guided(on.x_star.clone(), self.rate);
             params.tolerance = params.tolerance.max(GUIDED_TOLERANCE);
@@ -324,22 +336,41 @@ mod tests {
 
     #[test]
     fn levels_go_from_coarse_to_fine_and_from_guided_to_free() {
-        let each = |gradient, medium, coarse| -> Vec<(Mesh, f64)> {
-            let levels = levels(gradient, medium, coarse).into_iter();
-            levels.map(|level| (level.mesh, level.rate)).collect()
+        let each = |params: DescentParams, medium, coarse| -> Vec<(Mesh, f64, f64)> {
+            let levels = levels(&params, medium, coarse).into_iter();
+            levels
+                .map(|level| (level.mesh, level.rate, level.rest))
+                .collect()
         };
-        let own = [(Own, 1000.0), (Own, 100.0), (Own, 0.0)];
-        assert_eq!(each(Gradient::Equilibrium, false, false), own);
-        let all = each(Gradient::Equilibrium, false, true);
-        assert_eq!((all[0], &all[1..]), ((Coarse, 1000.0), &own[..]));
-        let all = [
-            (Coarse, 1000.0),
-            (Medium, 1000.0),
-            (Medium, 100.0),
-            (Medium, 0.0),
-            (Own, 0.0),
+        let newton = DescentParams::default();
+        let own = [
+            (Own, 1000.0, NEARLY),
+            (Own, 100.0, NEARLY),
+            (Own, 0.0, NEARLY),
+            (Own, 0.0, 0.0),
         ];
-        assert_eq!(each(Gradient::Equilibrium, true, true), all);
-        assert_eq!(each(Gradient::Trajectory, false, false), [(Own, 0.0)]);
+        assert_eq!(each(newton, false, false), own);
+        let all = each(newton, false, true);
+        assert_eq!((all[0], &all[1..]), ((Coarse, 1000.0, NEARLY), &own[..]));
+        let all = [
+            (Coarse, 1000.0, NEARLY),
+            (Medium, 1000.0, NEARLY),
+            (Medium, 100.0, NEARLY),
+            (Medium, 0.0, NEARLY),
+            (Own, 0.0, NEARLY),
+            (Own, 0.0, 0.0),
+        ];
+        assert_eq!(each(newton, true, true), all);
+        let downhill = DescentParams {
+            optimizer: Optimizer::Lbfgs,
+            ..newton
+        };
+        let free = [(Medium, 0.0, 0.0), (Own, 0.0, 0.0)];
+        assert_eq!(each(downhill, true, false)[2..], free);
+        let paper = DescentParams {
+            gradient: Gradient::Trajectory,
+            ..downhill
+        };
+        assert_eq!(each(paper, false, false), [(Own, 0.0, 0.0)]);
     }
 }
