@@ -181,7 +181,7 @@ impl Meshes<'_> {
             };
             match level.search(on, &guesses, checkpoint.take(), keep, run)? {
                 Ok(found) => last = Some((level, found)),
-                Err(failed) if decides => return Err(self.own.told(failed)),
+                Err(failed) if decides && !again => return Err(self.own.told(failed)),
                 Err(_) => {}
             }
         }
@@ -189,7 +189,7 @@ impl Meshes<'_> {
     }
 }
 
-/// The levels of a refit. Time steps have no guides, as they have none in the paper. Free cloth is as near to rest as is
+/// The levels of a refit. Time steps have no guides, as they have none in the paper. Free cloth comes as near to rest as is
 /// asked for in the last level, and wherever steps come from the gradient alone: so many small ones lead to states that
 /// are not of rest.
 fn levels(params: &DescentParams, medium: bool, coarse: bool) -> Vec<Level> {
