@@ -224,9 +224,7 @@ fn first_drape(
 ) -> Result<(Vec<Vec3>, Iteration), Failed> {
     let scene = prepared.scene();
     let mut sim = *scene.params;
-    let rest = &mut sim.equilibrium;
-    rest.tolerance = rest.tolerance.max(ALMOST_AT_REST);
-    rest.polished = rest.polished.max(ALMOST_AT_REST);
+    sim.equilibrium = sim.equilibrium.no_nearer_than(ALMOST_AT_REST);
     let scene = Scene {
         params: &sim,
         ..scene
@@ -294,9 +292,7 @@ impl Level {
         let free = on.scene();
         let mut cloth = free.cloth.clone();
         let mut sim = *free.params;
-        let rest = &mut sim.equilibrium;
-        rest.tolerance = rest.tolerance.max(self.rest);
-        rest.polished = rest.polished.max(self.rest);
+        sim.equilibrium = sim.equilibrium.no_nearer_than(self.rest);
         if self.rate > 0.0 {
             cloth = cloth.guided(on.x_star.clone(), self.rate);
             params.tolerance = params.tolerance.max(GUIDED_TOLERANCE);

@@ -53,6 +53,17 @@ impl Default for EquilibriumParams {
     }
 }
 
+impl EquilibriumParams {
+    /// The same, but no nearer to rest than `residual` \[–\].
+    pub(crate) fn no_nearer_than(self, residual: f64) -> Self {
+        Self {
+            tolerance: self.tolerance.max(residual),
+            polished: self.polished.max(residual),
+            ..self
+        }
+    }
+}
+
 /// How a search for equilibrium ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
